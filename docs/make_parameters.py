@@ -7,7 +7,7 @@ from pathlib import Path
 
 from docs.blocks import table
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table
-from percussion_model.scene.rows import Row, short_number, toml_value
+from percussion_model.scene.rows import ParameterRow, short_number, toml_value
 
 HEAD = """# Parameters
 
@@ -34,7 +34,7 @@ One key stands before all tables, beside `title`. No solver takes it, and FMUs d
 HEADINGS = ("key", "meaning", "unit", "default", "allowed", "typical", "matters if")
 
 
-def default(row: Row) -> str:
+def default(row: ParameterRow) -> str:
     """How the default is shown."""
     if row.required:
         return "required"
@@ -49,14 +49,14 @@ def default(row: Row) -> str:
     return f"`{toml_value(row.default)}`"
 
 
-def allowed(row: Row) -> str:
+def allowed(row: ParameterRow) -> str:
     """What is allowed, without the unit, which has its own column."""
     if row.kind == "choice":
         return ", ".join(f"`{toml_value(choice)}`" for choice in row.choices)
     return row.allowed.removesuffix(f" {row.unit}") if row.unit else row.allowed
 
 
-def typical(row: Row) -> str:
+def typical(row: ParameterRow) -> str:
     """The range that sources have; nothing where they have none."""
     if row.typical is None:
         return ""
@@ -64,7 +64,7 @@ def typical(row: Row) -> str:
     return f"{low} to {high}"
 
 
-def cells(row: Row) -> tuple[str, ...]:
+def cells(row: ParameterRow) -> tuple[str, ...]:
     """A row of a table of parameters."""
     key, needs = row.key.replace("*", "N"), f"`{row.effect}`" if row.effect else ""
     shown = default(row), allowed(row), typical(row), needs

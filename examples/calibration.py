@@ -18,9 +18,9 @@ from percussion_model import Scene
 from percussion_model.analysis.fitting import (
     Curve,
     DropTest,
-    bilinear_force,
     drop_test_signal,
     fit_rock,
+    slow_force,
 )
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.calibration import save_calibration
@@ -46,9 +46,7 @@ def drop_scene(solver: str) -> Scene:
 def measured_curve(noise: np.random.Generator) -> Curve:
     """A slow test whose gauge begins 50 µm above the rock."""
     way = np.concatenate([np.linspace(0.0, 8.5e-4, 60), np.linspace(8.5e-4, 7.2e-4, 41)[1:]])
-    force = bilinear_force(
-        way, TRUTH["rock.loading_stiffness"], TRUTH["rock.unloading_ratio"], datum=5e-5
-    )
+    force = slow_force(way, Scene().replace(**TRUTH), datum=5e-5)
     return Curve(way, force + noise.normal(0.0, FORCE_NOISE, len(way)), "slow test")
 
 

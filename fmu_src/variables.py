@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from percussion_model.scene.rows import Row
+from percussion_model.scene.rows import ParameterRow
 
 Causality = Literal["parameter", "input", "output"]
 # Within the resources of an FMU.
@@ -42,7 +42,7 @@ class Variable:
     upper: float | None = None
     nominal: float | None = None
     start: Any = None
-    row: Row | None = None  # bounds of a parameter or an input
+    row: ParameterRow | None = None  # bounds of a parameter or an input
     key: str | None = None  # of the scene
     left_out: Any = None  # value that stands for "left out"
     at_start: tuple[str, ...] | None = None
@@ -70,24 +70,24 @@ def read_variables(folder: str) -> tuple[Variable, ...]:
     )
 
 
-def read_row(entry: Mapping[str, Any]) -> Row:
+def read_row(entry: Mapping[str, Any]) -> ParameterRow:
     """A row of the parameter table from its plain values; JSON has no tuples."""
     needs = {key: tuple(values) for key, values in entry["needs"].items()}
     typical = None if entry["typical"] is None else tuple(entry["typical"])
     lists = {"choices": tuple(entry["choices"]), "typical": typical}
-    return Row(**{**entry, **lists, "needs": needs})
+    return ParameterRow(**{**entry, **lists, "needs": needs})
 
 
-def number_row(key: str, unit: str, lower: float, upper: float, description: str) -> Row:
+def number_row(key: str, unit: str, lower: float, upper: float, description: str) -> ParameterRow:
     """Row of a number that only an FMU has."""
-    return Row(
+    return ParameterRow(
         key=key, kind="number", unit=unit, lower=lower, lower_open=False, upper=upper,
         upper_open=False, default=None, required=False, choices=(), description=description,
         needs={},
     )  # fmt: skip
 
 
-def closed_bounds(row: Row | None) -> tuple[float, float]:
+def closed_bounds(row: ParameterRow | None) -> tuple[float, float]:
     """Between these, both included, a number is allowed without a closer look."""
     if row is None or row.kind != "number" or row.choices:
         return EMPTY

@@ -6,12 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from .harness import Instance, command_line, plot, ramp, run
+from .harness import Instance, command_line, ramp, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 LOW, HIGH = 0.8, 1.6  # the ramp begins and ends [s]
 FEED = 500.0, 2500.0  # [N]
 PRESSURE = 5e5, 20e5  # [Pa]
+TITLE = "Collaring: feed and supply pressure rise"
+PANELS = (
+    ("supply pressure [bar]", 1e-5, "supply_pressure"),
+    ("feed force [kN]", 1e-3, "feed_force"),
+    ("blow energy [J]", 1, "blow_energy"),
+    ("blow frequency [1/s]", 1, "blow_frequency"),
+    ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
+    ("depth of the bit [mm]", 1e3, "bit.position"),
+)
 
 
 def signals() -> dict:
@@ -33,22 +42,5 @@ def simulate(hammer: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def draw(found: dict[str, np.ndarray], path: Path) -> Path:
-    """Draw the scenario."""
-    return plot(
-        path,
-        "Collaring: feed and supply pressure rise",
-        found,
-        [
-            ("supply pressure [bar]", 1e-5, "supply_pressure"),
-            ("feed force [kN]", 1e-3, "feed_force"),
-            ("blow energy [J]", 1, "blow_energy"),
-            ("blow frequency [1/s]", 1, "blow_frequency"),
-            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
-            ("depth of the bit [mm]", 1e3, "bit.position"),
-        ],
-    )
-
-
 if __name__ == "__main__":
-    command_line("collaring_ramp", simulate, draw)
+    command_line("collaring_ramp", simulate, TITLE, PANELS)

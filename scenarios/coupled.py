@@ -73,7 +73,7 @@ def held_since(time: np.ndarray, held: np.ndarray) -> float:
 def draw_runs(
     path: Path,
     title: str,
-    runs: Mapping[str, CoupledRun],
+    runs: Mapping[str, CoupledRun | Mapping[str, np.ndarray]],
     panels: Sequence[Panel],
     marks: Mapping[str, Sequence[tuple[float, str]]] | None = None,
     spans: Sequence[tuple[float, float, str]] = (),
@@ -83,7 +83,7 @@ def draw_runs(
     Parameters
     ----------
     runs : mapping
-        Runs by what the legend calls them.
+        Runs, or their columns, by what the legend calls them.
     panels : sequence of tuple
         Label with unit, factor, signal.
     marks : mapping, optional
@@ -167,6 +167,13 @@ def write(
 
 def print_numbers(found: Mapping[str, Mapping[str, float]], shown: Mapping[str, Quantity]) -> None:
     """Print numbers of runs, a column for each run, and what is known of their errors."""
+    print_columns(found, shown)
+    step = f"the communication step of {1e3 * STEP:g} ms"
+    print(wrapped(f"The error by {step} was not estimated: numbers have three digits."))
+
+
+def print_columns(found: Mapping[str, Mapping[str, float]], shown: Mapping[str, Quantity]) -> None:
+    """Print numbers of runs, a column for each run."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("")
     for case in found:
@@ -176,5 +183,3 @@ def print_numbers(found: Mapping[str, Mapping[str, float]], shown: Mapping[str, 
         values = (factor * numbers[key] for numbers in found.values())
         table.add_row(words, *("never" if isnan(one) else in_digits(one) for one in values), unit)
     print_table(table)
-    step = f"the communication step of {1e3 * STEP:g} ms"
-    print(wrapped(f"The error by {step} was not estimated: numbers have three digits."))

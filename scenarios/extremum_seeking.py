@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 
@@ -47,16 +46,6 @@ SIGNALS = ("hammer.blow_position", "hammer.blow_time", "controller.seek.centre",
            "controller.feed_wanted", "controller.seek.gradient")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Top:
-    """Top of a hill, with standard errors: feed [N] and rate [m/s]."""
-
-    feed: float
-    rate: float
-    feed_error: float
-    rate_error: float
-
-
 def values(feed: float) -> dict[str, float]:
     """Setpoint and start of a run; the rig's force without drilling is feed less weights."""
     return {
@@ -96,10 +85,8 @@ def sweep(
     return np.array(rows)
 
 
-def top_of(hill: np.ndarray) -> Top:
-    """Top of a hill, between the feeds of the sweep.
-
-    The errors are those of the jackknife: how much the top moves when one feed is left out.
+def top_of(hill: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Top of a hill, between the feeds of the sweep: feed [N] and rate [m/s], and their errors.
 
     Parameters
     ----------
@@ -107,11 +94,16 @@ def top_of(hill: np.ndarray) -> Top:
         See `sweep`.
     """
     greatest = hill[np.argmax(hill[:, 1]), 0]
-    near = hill[np.abs(np.log(hill[:, 0] / greatest)) <= NEAR]
-    tops = np.array([_fitted(np.delete(near, k, axis=0)) for k in range(len(near))])
-    count = len(tops)
-    errors = np.sqrt((count - 1) / count * np.sum((tops - tops.mean(axis=0)) ** 2, axis=0))
-    return Top(*_fitted(near), *(float(error) for error in errors))
+    return with_jackknife(_fitted, hill[np.abs(np.log(hill[:, 0] / greatest)) <= NEAR])
+
+
+def with_jackknife(
+    top: Callable[[np.ndarray], Sequence[float]], hill: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of a hill, and their standard errors: how they move when one point is left out."""
+    tops = np.array([top(np.delete(hill, k, axis=0)) for k in range(len(hill))])
+    errors = np.sqrt((len(tops) - 1) / len(tops) * np.sum((tops - tops.mean(axis=0)) ** 2, axis=0))
+    return np.array(top(hill)), errors
 
 
 def _fitted(hill: np.ndarray) -> tuple[float, float]:
@@ -143,22 +135,22 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
 
     from percussion_model.interface.plotting.style import head, label
 
-    top = top_of(hill)
+    (best_feed, best_rate), _ = top_of(hill)
     figure = Figure(figsize=(11.0, 4.8), layout="constrained")
     axes = figure.subplots(1, 2)
     axes[0].plot(1e-3 * hill[:, 0], 1e3 * hill[:, 1], "o-", color="0.4", markersize=4,
                  label="feed held (open loop)")  # fmt: skip
-    axes[0].axhspan((1.0 - BOUND) * 1e3 * top.rate, 1e3 * top.rate, color="#cfe8cf", zorder=0,
+    axes[0].axhspan((1.0 - BOUND) * 1e3 * best_rate, 1e3 * best_rate, color="#cfe8cf", zorder=0,
                     label=f"within {100 * BOUND:.0f} % of the best rate")  # fmt: skip
     for run, marker in zip(runs, cycle("s^o"), strict=False):
         centre = run["controller.seek.centre"]
         rate = rate_over(run, run["time"][-1] - LAST)
-        words = f"from {1e-3 * centre[0]:.1f} kN: {100 * (rate / top.rate - 1.0):+.1f} %"
+        words = f"from {1e-3 * centre[0]:.1f} kN: {100 * (rate / best_rate - 1.0):+.1f} %"
         (line,) = axes[1].plot(run["time"], 1e-3 * centre, label=f"from {1e-3 * centre[0]:.1f} kN")
         axes[0].plot(1e-3 * centre[-1], 1e3 * rate, marker, color=line.get_color(), label=words,
                      fillstyle="none", markersize=9)  # fmt: skip
-    axes[1].axhline(1e-3 * top.feed, color="k", linewidth=0.9, linestyle="--",
-                    label=f"best feed of the sweep, {1e-3 * top.feed:.2f} kN")  # fmt: skip
+    axes[1].axhline(1e-3 * best_feed, color="k", linewidth=0.9, linestyle="--",
+                    label=f"best feed of the sweep, {1e-3 * best_feed:.2f} kN")  # fmt: skip
     label(axes[0], "feed force [kN]", "rate of penetration [mm/s]",
           "Where the seeker ends, its swing included")  # fmt: skip
     label(axes[1], "time [s]", "feed about which the seeker swings [kN]", "The way of the seeker")
@@ -173,14 +165,14 @@ def main(paths: Sequence[Path], folder: Path) -> list[Path]:
     with progress("sweeping held feeds, then seeking"):
         hill = sweep(*paths)
         runs = {f"from {start:.0f} N": seek(*paths, start) for start in STARTS}
-    top = top_of(hill)
-    print(f"best feed {with_error(top.feed, top.feed_error)} N, "
-          f"rate {with_error(1e3 * top.rate, 1e3 * top.rate_error)} mm/s")  # fmt: skip
+    top, errors = top_of(hill)
+    print(f"best feed {with_error(top[0], errors[0])} N, "
+          f"rate {with_error(1e3 * top[1], 1e3 * errors[1])} mm/s")  # fmt: skip
     print(ABOUT_STEP)
     for name, run in runs.items():
         rate = rate_over(run, DURATION - LAST)
         print(f"{name}: {about(run['controller.seek.centre'][-1])} N, "
-              f"{reached(rate, top.rate, top.rate_error)}")  # fmt: skip
+              f"{reached(rate, top[1], errors[1])}")  # fmt: skip
     columns = ("feed_force", "rate_of_penetration")
     return write_search(NAME, folder, draw, hill, columns, runs)
 

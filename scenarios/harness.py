@@ -1,9 +1,7 @@
-"""Run FMUs with input signals, collect outputs, compare and plot: a thin layer on fmpy."""
+"""Run FMUs with input signals, collect outputs and plot: a thin layer on fmpy."""
 
 from __future__ import annotations
 
-import csv
-import difflib
 import shutil
 import sys
 import tempfile
@@ -13,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import extract, read_model_description
+from fmpy import extract
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
 
-from percussion_model.coupling.component import COMPILING, WARNING
+from percussion_model.coupling.component import (
+    Component,
+    find_variable,
+    number_of_word,
+    read_description,
+)
 from percussion_model.interface.progress import progress
 
 from . import results
@@ -30,10 +28,12 @@ from .results import Archive, ScenarioError
 
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
+# "quantity [unit]", its factor, and names of the columns in a panel.
+Panel = tuple[str, *tuple[float | str, ...]]
 
 
-class Instance:
-    """One instance of an FMU, its variables by name.
+class Instance(Component):
+    """One instance of an FMU, its variables by name; what the FMU refuses is an error of fmpy.
 
     Parameters
     ----------
@@ -53,36 +53,12 @@ class Instance:
     """
 
     def __init__(self, fmu: str | Path, name: str = "instance") -> None:
-        self.folder = Path(fmu)
-        self._own = None
-        if self.folder.is_file():
+        folder, self._own = str(fmu), None
+        if Path(fmu).is_file():
             self._own = tempfile.mkdtemp(prefix="fmu-")
-            self.folder = Path(extract(str(fmu), self._own))
-        self.description = read_model_description(str(self.folder))
-        if self.description.coSimulation is None:
-            raise ScenarioError(f"{fmu}: is no FMU for co-simulation")
-        self.variables = {one.name: one for one in self.description.modelVariables}
+            folder = extract(folder, self._own)
+        super().__init__(name, folder, read_description(name, folder))
         self.time = 0.0
-        self.messages: list[str] = []
-        self.faults: list[str] = []
-        self._logger = fmi2CallbackLoggerTYPE(self._note)
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = self._logger
-        self._callbacks = callbacks
-        self.slave = FMU2Slave(
-            guid=self.description.guid,
-            unzipDirectory=str(self.folder),
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
-        self.slave.instantiate(callbacks=callbacks, loggingOn=True)
-
-    def _note(
-        self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
-    ) -> None:
-        self.messages.append(text.decode("utf-8", "replace"))
-        if status > WARNING:
-            self.faults.append(self.messages[-1])
 
     def start(self, time: float = 0.0, **values: Any) -> Instance:
         """Set values by name (`__` for a dot, as in bit__force), then initialise."""
@@ -90,40 +66,29 @@ class Instance:
         self.time = time
         self.slave.setupExperiment(startTime=time)
         self.slave.enterInitializationMode()
-        for text in self.messages:
-            if COMPILING in text:
-                results.tell(text)
+        for text in self.compilation():
+            results.tell(text)
         self.slave.exitInitializationMode()
         return self
+
+    def find(self, name: str) -> Any:
+        """A variable by name; the error suggests another one."""
+        return find_variable("the FMU", self.variables, name)
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set parameters or inputs; enumerations by number or by word."""
         for name, value in values.items():
-            one = self.find(name)
-            if one.type == "Real":
-                self.slave.setReal([one.valueReference], [float(value)])
-            elif one.type == "Boolean":
-                self.slave.setBoolean([one.valueReference], [bool(value)])
-            else:
-                if isinstance(value, str):
-                    items = {item.name: int(item.value) for item in one.declaredType.items}
-                    value = items[value]
-                self.slave.setInteger([one.valueReference], [int(value)])
-
-    def find(self, name: str) -> Any:
-        """A variable by name; the error suggests another one."""
-        if name not in self.variables:
-            near = difflib.get_close_matches(name, self.variables, 1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise ScenarioError(f"the FMU has no variable {name}{hint}")
-        return self.variables[name]
+            one, family = self.find(name), self.family(name)
+            if isinstance(value, str):
+                value = number_of_word(self.name, one, value)
+            kind = {"Real": float, "Boolean": bool}.get(family, int)
+            getattr(self.slave, f"set{family}")([one.valueReference], [kind(value)])
 
     def get(self, name: str) -> Any:
         """Present value of a variable."""
-        one = self.find(name)
-        read = {"Real": self.slave.getReal, "Boolean": self.slave.getBoolean}
-        value = read.get(one.type, self.slave.getInteger)([one.valueReference])[0]
-        return bool(value) if one.type == "Boolean" else value
+        family = self.family(name)
+        value = getattr(self.slave, f"get{family}")([self.find(name).valueReference])[0]
+        return bool(value) if family == "Boolean" else value
 
     def values(self, names: Iterable[str]) -> list[Any]:
         """Present values of several variables."""
@@ -158,9 +123,7 @@ class Instance:
 
     def free(self) -> None:
         """End the instance; does nothing the second time."""
-        if self.slave is not None:
-            self.slave.freeInstance()
-            self.slave = None
+        super().free()
         if self._own is not None:
             shutil.rmtree(self._own, ignore_errors=True)
             self._own = None
@@ -220,36 +183,9 @@ def run(
     return {name: table[:, k] for k, name in enumerate(["time", *names])}
 
 
-def read_signals(path: str | Path) -> dict[str, Callable[[float], float]]:
-    """Signals of a CSV file with a column `time`; a value holds until the next row."""
-    with open(path, newline="", encoding="utf-8") as file:
-        head, *rows = list(csv.reader(file))
-    table = np.array(rows, dtype=float)
-    times = table[:, head.index("time")]
-
-    def held(column: np.ndarray) -> Callable[[float], float]:
-        return lambda t: float(column[max(0, np.searchsorted(times, t, side="right") - 1)])
-
-    return {name: held(table[:, k]) for k, name in enumerate(head) if name != "time"}
-
-
-def greatest_difference(
-    found: Mapping[str, np.ndarray], wanted: Mapping[str, np.ndarray]
-) -> dict[str, float]:
-    """Greatest difference of each common column, by the greatest number in it."""
-    return {
-        name: float(np.max(np.abs(found[name] - wanted[name])))
-        / (float(np.max(np.abs(wanted[name]))) or 1.0)
-        for name in wanted
-        if name in found
-    }
-
-
 @in_style
-def plot(
-    path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequence[tuple[str, ...]]
-) -> Path:
-    """Draw columns over time, a panel for each ("quantity [unit]", factor, names...).
+def plot(path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequence[Panel]) -> Path:
+    """Draw columns over time, one panel below the other.
 
     Returns
     -------
@@ -272,14 +208,18 @@ def plot(
 def command_line(
     name: str,
     simulate: Callable[..., dict[str, np.ndarray]],
-    draw: Callable[[dict[str, np.ndarray], Path], Path],
+    title: str,
+    panels: Sequence[Panel],
     *drives: Archive,
 ) -> None:
-    """Run a scenario of the hammer by `python -m scenarios.NAME`; see `results.command_line`."""
+    """Run a scenario of the hammer by `python -m scenarios.NAME`, and plot it.
+
+    See `plot` and `results.command_line`.
+    """
 
     def work(paths: Sequence[Path], folder: Path) -> list[Path]:
         with progress(f"running {name}"):
-            return [draw(simulate(*paths), folder / f"{name}.png")]
+            return [plot(folder / f"{name}.png", title, simulate(*paths), panels)]
 
     about = sys.modules[simulate.__module__].__doc__
     results.command_line(name, about, (fmu("HAMMER.fmu"), *drives), work)

@@ -6,12 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
-from .harness import Instance, command_line, plot, run
+from .harness import Instance, command_line, run
 
 DURATION, STEP = 3.0, 1e-2  # [s]
 SOFT, HARD = 3e8, 1.2e9  # K_R [N/m]
 # The hard layer by depth of the bit [m].
 LAYER = 0.025, 0.040
+TITLE = "Soft, hard and soft rock by depth"
+PANELS = (
+    ("loading stiffness $K_R$ of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
+    ("depth of the bit [mm]", 1e3, "bit.position"),
+    ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
+    ("peak force on the rock in each step [kN]", 1e-3, "bit.force_peak"),
+    ("share of the blow energy that reaches the rock [–]", 1, "transfer_efficiency"),
+)
 
 
 def simulate(hammer: Path) -> dict[str, np.ndarray]:
@@ -30,21 +38,5 @@ def simulate(hammer: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def draw(found: dict[str, np.ndarray], path: Path) -> Path:
-    """Draw the scenario."""
-    return plot(
-        path,
-        "Soft, hard and soft rock by depth",
-        found,
-        [
-            ("loading stiffness $K_R$ of the rock [kN/mm]", 1e-6, "rock.loading_stiffness"),
-            ("depth of the bit [mm]", 1e3, "bit.position"),
-            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
-            ("peak force on the rock in each step [kN]", 1e-3, "bit.force_peak"),
-            ("share of the blow energy that reaches the rock [–]", 1, "transfer_efficiency"),
-        ],
-    )
-
-
 if __name__ == "__main__":
-    command_line("layered_rock", simulate, draw)
+    command_line("layered_rock", simulate, TITLE, PANELS)

@@ -6,10 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from .harness import Instance, command_line, fmu, plot, run
+from .harness import Instance, command_line, fmu, run
 
 DURATION, STEP = 0.6, 1e-4  # [s]
 CHAMBERS = ("upper.pressure", "lower.pressure", "piston_force", "air_used")
+TITLE = "A pneumatic drive in an FMU of its own"
+PANELS = (
+    ("pressure [bar]", 1e-5, "upper.pressure", "lower.pressure"),
+    ("piston force [kN]", 1e-3, "piston_force"),
+    ("position [mm]", 1e3, "piston.position", "bit.position"),
+    ("impact velocity [m/s]", 1, "impact_velocity"),
+    ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
+)
 
 
 def simulate(hammer: Path, drive: Path) -> dict[str, np.ndarray]:
@@ -36,21 +44,5 @@ def simulate(hammer: Path, drive: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def draw(found: dict[str, np.ndarray], path: Path) -> Path:
-    """Draw the scenario."""
-    return plot(
-        path,
-        "A pneumatic drive in an FMU of its own",
-        found,
-        [
-            ("pressure [bar]", 1e-5, "upper.pressure", "lower.pressure"),
-            ("piston force [kN]", 1e-3, "piston_force"),
-            ("position [mm]", 1e3, "piston.position", "bit.position"),
-            ("impact velocity [m/s]", 1, "impact_velocity"),
-            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
-        ],
-    )
-
-
 if __name__ == "__main__":
-    command_line("pneumatic_drive", simulate, draw, fmu("DRIVE.fmu", "PneumaticDrive"))
+    command_line("pneumatic_drive", simulate, TITLE, PANELS, fmu("DRIVE.fmu", "PneumaticDrive"))

@@ -6,11 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from .harness import Instance, command_line, plot, ramp, run
+from .harness import Instance, command_line, ramp, run
 
 DURATION, STEP = 2.4, 5e-3  # [s]
 FULL, LEFT = 20e5, 8e5  # [Pa]
 LOST, BACK = (0.7, 0.75), (1.6, 1.65)  # [s]
+TITLE = "Loss of supply pressure"
+PANELS = (
+    ("supply pressure [bar]", 1e-5, "supply_pressure"),
+    ("impact velocity [m/s]", 1, "impact_velocity"),
+    ("blow energy [J]", 1, "blow_energy"),
+    ("blow frequency [1/s]", 1, "blow_frequency"),
+    ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
+)
 
 
 def simulate(hammer: Path) -> dict[str, np.ndarray]:
@@ -22,21 +30,5 @@ def simulate(hammer: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def draw(found: dict[str, np.ndarray], path: Path) -> Path:
-    """Draw the scenario."""
-    return plot(
-        path,
-        "Loss of supply pressure",
-        found,
-        [
-            ("supply pressure [bar]", 1e-5, "supply_pressure"),
-            ("impact velocity [m/s]", 1, "impact_velocity"),
-            ("blow energy [J]", 1, "blow_energy"),
-            ("blow frequency [1/s]", 1, "blow_frequency"),
-            ("rate of penetration, last blow [mm/s]", 1e3, "rate_of_penetration"),
-        ],
-    )
-
-
 if __name__ == "__main__":
-    command_line("pressure_loss", simulate, draw)
+    command_line("pressure_loss", simulate, TITLE, PANELS)

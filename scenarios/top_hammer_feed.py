@@ -13,16 +13,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from percussion_model.interface.progress import progress
-from percussion_model.interface.tables import print_table
 from percussion_model.scene.hammers import hammer
-from percussion_model.simulation.uncertain import in_digits
 
-from .coupled import Quantity, save_table
-from .drawing import in_style, save_png, stacked
+from .coupled import Quantity, draw_runs, print_columns, save_table
 from .harness import Instance
 from .results import DIST, Archive, command_line
 
@@ -168,40 +163,18 @@ def numbers(found: Run) -> dict[str, float]:
     }
 
 
-@in_style
 def draw(runs: Mapping[str, Run], path: Path) -> Path:
     """Draw the runs over time."""
-    labels = [label for label, _, _ in PANELS]
-    title = "A soft layer: less pressure keeps tension out of the string"
-    figure, axes = stacked(title, labels, (8.5, 10.0))
-    marks = {
-        "feed_force": [(1e-3 * FEED, "wanted")],
-        "tension": [(1e-6 * LIMIT, "limit"), (1e-6 * preload(), "preload of\na thread")],
-    }
-    for ax, (_, factor, column) in zip(axes, PANELS, strict=True):
-        for (label, found), colour in zip(runs.items(), ("C0", "C1"), strict=True):
-            ax.plot(found["time"], factor * found[column], color=colour, linewidth=1.2,
-                    label=label)  # fmt: skip
-        for level, text in marks.get(column, ()):
-            ax.axhline(level, color="k", linewidth=0.8, linestyle="--")
-            ax.annotate(text, (1.01, level), xycoords=("axes fraction", "data"), va="center")
-        ax.margins(x=0.01, y=0.12)
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=2)
-    return save_png(figure, path)
-
-
-def show(runs: Mapping[str, Run]) -> None:
-    """Print the numbers of the runs, a column for each."""
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    table.add_column("")
-    for label in runs:
-        table.add_column(label, justify="right")
-    table.add_column("unit", no_wrap=True)
-    found = [numbers(one) for one in runs.values()]
-    for name, (words, factor, unit) in SHOWN.items():
-        table.add_row(words, *(in_digits(factor * one[name]) for one in found), unit)
-    print_table(table)
+    return draw_runs(
+        path,
+        "A soft layer: less pressure keeps tension out of the string",
+        runs,
+        PANELS,
+        {
+            "feed_force": [(1e-3 * FEED, "wanted")],
+            "tension": [(1e-6 * LIMIT, "limit"), (1e-6 * preload(), "preload of\na thread")],
+        },
+    )
 
 
 def main(paths: Sequence[Path], folder: Path) -> list[Path]:
@@ -211,7 +184,7 @@ def main(paths: Sequence[Path], folder: Path) -> list[Path]:
             "tension watched": simulate(*paths),
             "pressure constant": simulate(*paths, watches=False),
         }
-    show(runs)
+    print_columns({label: numbers(found) for label, found in runs.items()}, SHOWN)
     tables = [
         save_table(found, folder / f"{NAME}_{label.replace(' ', '_')}.csv")
         for label, found in runs.items()

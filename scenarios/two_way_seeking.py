@@ -27,6 +27,7 @@ from .extremum_seeking import (
     about,
     rate_over,
     reached,
+    with_jackknife,
     write_search,
 )
 from .results import command_line, system, tell
@@ -105,10 +106,7 @@ def top_of(hill: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     top, errors : ndarray, shape (3,)
         Feed [N], pressure [Pa], rate [m/s].
     """
-    tops = np.array([_top(np.delete(hill, k, axis=0)) for k in range(len(hill))])
-    count = len(tops)
-    errors = np.sqrt((count - 1) / count * np.sum((tops - tops.mean(axis=0)) ** 2, axis=0))
-    return np.array(_top(hill)), errors
+    return with_jackknife(_top, hill)
 
 
 def _axes(hill: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -135,14 +133,8 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
     above = figure.add_subplot(grid[:, 0])
-    filled = above.contourf(
-        1e-3 * feeds,
-        1e-5 * pressures,
-        1e3 * surface(hill, feeds, pressures).T,
-        12,
-        cmap="Greys",
-        alpha=0.6,
-    )
+    rates = 1e3 * surface(hill, feeds, pressures).T
+    filled = above.contourf(1e-3 * feeds, 1e-5 * pressures, rates, 12, cmap="Greys", alpha=0.6)
     figure.colorbar(filled, ax=above, label="rate of penetration, held (open loop) [mm/s]")
     above.grid(False)
     above.plot(1e-3 * hill[:, 0], 1e-5 * hill[:, 1], "k.", markersize=3, label="sweep")
@@ -157,18 +149,10 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
         for ax, factor, centre in zip(over_time, (1e-3, 1e-5), centres, strict=True):
             ax.plot(run["time"], factor * centre, color=line.get_color())
     above.plot(1e-3 * top[0], 1e-5 * top[1], "k*", markersize=13, label="top of the sweep")
-    for ax, level, text, name in (
-        (
-            over_time[0],
-            1e-3 * top[0],
-            "feed [kN]",
-            "Centres of the swings; dashed: best of the sweep",
-        ),
-        (over_time[1], 1e-5 * top[1], "pressure [bar]", ""),
-    ):
+    for ax, level in zip(over_time, (1e-3 * top[0], 1e-5 * top[1]), strict=True):
         ax.axhline(level, color="k", linewidth=0.9, linestyle="--")
-        label(ax, "", text, name)
-    over_time[1].set_xlabel("time [s]")
+    label(over_time[0], "", "feed [kN]", "Centres of the swings; dashed: best of the sweep")
+    label(over_time[1], "time [s]", "pressure [bar]", "")
     label(above, "feed force [kN]", "supply pressure that is asked for [bar]",
           "Ways over the hill; rate at the end by the best one")  # fmt: skip
     head(figure, "Extremum seeking on feed and pressure at once")

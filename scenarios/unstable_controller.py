@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.coupling import CoupledRun
-from percussion_model.coupling.bench import HIGHEST_FEED, TRIALS, judge
+from percussion_model.coupling.bench import HIGHEST_FEED, STANDARD_RUNS, judge
 
 from .coupled import FEED, draw_runs, run, write
 
@@ -78,7 +78,7 @@ def numbers(found: CoupledRun) -> dict[str, float]:
         growth [1/s]; first and greatest swing [N]; those of `percussion bench-controller`.
     """
     sizes = swings(found)
-    score = judge(TRIALS[0], found)
+    score = judge(STANDARD_RUNS[0], found)
     return {
         "growth": growth(sizes), "first_swing": float(sizes[0]),
         "greatest_swing": float(sizes.max()), "points": score.points,

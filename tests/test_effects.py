@@ -17,7 +17,7 @@ from percussion_model.analysis.change import Change
 from percussion_model.analysis.effect_study import (
     NOISE,
     EffectsStudy,
-    Trial,
+    VariantRun,
     effect_variants,
     step_costs,
     study_effects,
@@ -182,7 +182,7 @@ def test_a_rate_that_scatter_hides_is_no_change(rigid):
 def test_a_short_run_does_not_hide_that_the_rate_cannot_be_trusted():
     scene = Scene().replace(**{"effects.loss": False, "solver.cells": 4})
     result = simulate(scene, 0.05, settle=0.0)
-    reason = Trial(variant_of(Scene(), "loss"), result, result.wall_time, None).reason
+    reason = VariantRun(variant_of(Scene(), "loss"), result, result.wall_time, None).reason
     assert "structural loss is off" in reason
     assert "whole blow" in reason
 

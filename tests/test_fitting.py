@@ -16,9 +16,9 @@ from percussion_model.analysis.fitting import (
     DropTest,
     FitError,
     Reading,
-    bilinear_force,
     drop_test_signal,
     fit_rock,
+    slow_force,
 )
 from percussion_model.analysis.fitting.curve import best_datum_and_peak
 from percussion_model.analysis.fitting.found import (
@@ -55,7 +55,7 @@ CURVE = noisy_curve(0)
 
 def test_force_rises_with_one_slope_and_falls_with_another():
     p = np.array([0.0, 1e-4, 4e-4, 5e-4, 4.5e-4, 3e-4])
-    force = bilinear_force(p, 1e9, 4.0, datum=1e-4)
+    force = slow_force(p, rock_of({STIFFNESS: 1e9, RATIO: 4.0}), datum=1e-4)
     assert force == pytest.approx([0.0, 0.0, 3e5, 4e5, 2e5, 0.0])
 
 

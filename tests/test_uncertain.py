@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from percussion_model import Scene, Settled, compare, settled, simulate
 from percussion_model.analysis.change import Change, change_error, change_of
 from percussion_model.analysis.comparison import Comparison
-from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
+from percussion_model.analysis.effect_study import EffectsStudy, Variant, VariantRun
 from percussion_model.analysis.study import Study, grid, table
 from percussion_model.analysis.study.response import KINDS, ROW
 from percussion_model.coupling.verdict import _jump
@@ -326,7 +326,7 @@ def test_equal_runs_differ_by_nothing():
 
 def test_effects_tell_changes_with_errors(aperiodic, periodic, hidden):
     def trial(result, name):
-        return Trial(Variant(name, "off"), result, 1.0, None)
+        return VariantRun(Variant(name, "off"), result, 1.0, None)
 
     trials = [trial(periodic, "a"), trial(hidden, "b")]
     found = EffectsStudy(RIGID, trial(aperiodic, ""), trials, {})
@@ -346,9 +346,11 @@ def test_effects_know_the_error_that_the_grid_makes():
     lengths = {"piston.sections.0.length": 0.287, "bit.sections.0.length": 0.411}
     scene = Scene().computed_by("wave", **lengths, **{"run.duration": 1.0, "run.settle": 0.4})
     result = simulate(scene, record_events=False)
-    base = Trial(Variant("", "as it is"), result, 1.0, None)
+    base = VariantRun(Variant("", "as it is"), result, 1.0, None)
     without = simulate(scene.replace(**{"effects.gravity": False}), record_events=False)
-    found = EffectsStudy(scene, base, [Trial(Variant("gravity", "off"), without, 1.0, None)], {})
+    found = EffectsStudy(
+        scene, base, [VariantRun(Variant("gravity", "off"), without, 1.0, None)], {}
+    )
     assert base.numbers()["rate_of_penetration_error"] == result.rate_of_penetration_error
     headings, rows, _ = table_of(found)
     assert "±" in rows[0][headings.index("rate\nmm/s")]

@@ -14,7 +14,7 @@ import pytest
 
 import percussion_model
 from percussion_model import Result, Scene, Simulation, compare, settled, simulate
-from percussion_model.analysis.effect_study import EffectsStudy, Trial, Variant
+from percussion_model.analysis.effect_study import EffectsStudy, Variant, VariantRun
 from percussion_model.analysis.study import Study, grid
 from percussion_model.analysis.study.response import ROW
 from percussion_model.coupling.coupled_run import CoupledRun
@@ -180,7 +180,7 @@ def test_what_is_given_for_the_solver_in_vain_is_warned_of():
 def test_public_objects_are_represented_in_a_few_lines(drop):
     result = simulate(RIGID, 1.0, settle=0.2)
     points = grid({"feed.force": np.linspace(1e3, 5e3, 300)})
-    trial = Trial(Variant("", "as it is"), result, 1.0, None)
+    trial = VariantRun(Variant("", "as it is"), result, 1.0, None)
     simulation = Simulation(RIGID)
     made = [
         REFERENCE, DROP, result, drop, compare(RIGID, ["rigid"], 1.0, 0.2), settled(RIGID),

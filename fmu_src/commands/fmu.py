@@ -52,8 +52,15 @@ def fmu(
             write_drive(output, flat_names)
             return
         path = write_hammer(scene, output, platforms, force, scene_option, rock, flat_names)
-        if not no_reference:
-            _write_reference(path)
+        if no_reference:
+            return
+        from fmu_src.reference import write_reference
+        from percussion_model.interface.progress import progress
+
+        with progress("running the FMU; the first run compiles"):
+            files = write_reference(path)
+        for written in files:
+            typer.echo(str(written))
 
 
 def write_hammer(
@@ -68,6 +75,7 @@ def write_hammer(
     """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
     from fmu_src.archive import content, state_of
     from fmu_src.hammer.build import about_hammer, build_hammer, hammer_name, refuse_other
+    from fmu_src.native.library import COMPILING, libraries, library_here
     from percussion_model.interface.progress import progress
 
     file, chosen = options.baked_scene(scene, scene_option, rock)
@@ -76,10 +84,11 @@ def write_hammer(
     about_hammer(chosen, path)  # refuses a name, before anything is compiled or --force offered
     refuse_other(path, chosen, force)
     check_fmu(output, path)
-    libraries = _libraries(names)
+    with progress(COMPILING):  # for this platform, if there is a compiler, where none are named
+        made = library_here() if names is None else libraries(names)
     before = content(path)
     with progress("building the FMU"):
-        guid = build_hammer(chosen, path, libraries, flat_names)
+        guid = build_hammer(chosen, path, made, flat_names)
     source = options.baked_from(scene, scene_option, rock)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
     return path
@@ -119,22 +128,3 @@ def _export_platforms(words: str) -> dict[str, str]:
                 "`percussion native` makes those for others"
             )
     return names
-
-
-def _libraries(names: dict[str, str] | None) -> dict[str, bytes]:
-    """Libraries for platforms; for this one, if there is a compiler, where none are named."""
-    from fmu_src.native.library import COMPILING, libraries, library_here
-    from percussion_model.interface.progress import progress
-
-    with progress(COMPILING):
-        return library_here() if names is None else libraries(names)
-
-
-def _write_reference(path: Path) -> None:
-    from fmu_src.reference import write_reference
-    from percussion_model.interface.progress import progress
-
-    with progress("running the FMU; the first run compiles"):
-        files = write_reference(path)
-    for written in files:
-        typer.echo(str(written))

@@ -20,7 +20,7 @@ from fmu_src.native.tables import model_tables
 from fmu_src.page import write_page
 from fmu_src.slave.native import library_name
 from fmu_src.staging import stage
-from fmu_src.variables import FILE, Variable, to_json, write_variables
+from fmu_src.variables import FILE, to_json, write_variables
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.writing import is_special
 from percussion_model.solvers.base import added_solvers
@@ -55,9 +55,11 @@ def build_hammer(
     about = about_hammer(scene, path, flat)
     variables = hammer_variables(scene)
     bundle = stage("percussive_hammer", "hammer", with_model=True)
+    identity = [bundle.name, [variable.name for variable in variables]]
     resources: dict[str, str | bytes] = {
         FILE: write_variables(variables),
-        "scene.json": to_json(_scene(scene, variables, bundle.name)),
+        # what an instance needs of the scene, besides its variables
+        "scene.json": to_json({"given": given_values(scene), "identity": identity}),
     }
     model = None
     if not added_solvers():  # the library has the solvers of the package alone
@@ -132,11 +134,3 @@ def about_hammer(scene: Scene, path: Path, flat: bool = False) -> About:
         version=f"{version('percussion_model')}, interface {VERSION}",
         flat=flat,
     )
-
-
-def _scene(scene: Scene, variables: list[Variable], bundle: str) -> dict[str, object]:
-    """What an instance needs of the scene, besides its variables."""
-    return {
-        "given": given_values(scene),
-        "identity": [bundle, [variable.name for variable in variables]],
-    }

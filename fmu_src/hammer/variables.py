@@ -21,7 +21,7 @@ from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row, parameter_table
-from percussion_model.scene.rows import Row
+from percussion_model.scene.rows import ParameterRow
 from percussion_model.scene.scene import Scene
 
 VERSION = 1
@@ -180,20 +180,8 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
     )
     carriers = gauge_bars(scene)
     bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(carriers))
-    yield Variable(
-        name="gauge.bar",
-        reference=reference("gauge.bar", "parameter"),
-        type="Enumeration",
-        causality="parameter",
-        description="bar that carries the gauge",
-        variability="fixed",
-        start=2,
-        row=_choice_row("gauge.bar", carriers),
-        enumeration="Bar",
-        items=bars,
-        lower=1,
-        upper=len(bars),
-    )
+    gauge = _parameter("gauge.bar", _choice_row("gauge.bar", carriers), "bit")
+    yield replace(gauge, key=None, enumeration="Bar", items=bars)
     yield _number(
         "gauge.position",
         reference("gauge.position", "parameter"),
@@ -236,7 +224,7 @@ def _outside(key: str) -> str:
     return "".join(parts).removeprefix(".")
 
 
-def _parameter(key: str, row: Row, value: Any) -> Variable:
+def _parameter(key: str, row: ParameterRow, value: Any) -> Variable:
     if row.kind == "number" or row.kind == "whole number":
         return _number(key, reference(key, "parameter"), row, value, "parameter", key=key)
     common: dict[str, Any] = {
@@ -266,7 +254,7 @@ def _parameter(key: str, row: Row, value: Any) -> Variable:
 def _number(
     name: str,
     number: int,
-    row: Row,
+    row: ParameterRow,
     value: Any,
     causality: Any,
     note: str = "",
@@ -297,16 +285,16 @@ def _number(
     )
 
 
-def _described(row: Row) -> str:
+def _described(row: ParameterRow) -> str:
     return row.description + (f"; has an effect where {row.effect}" if row.needs else "")
 
 
-def _choice_row(key: str, choices: tuple[str, ...]) -> Row:
+def _choice_row(key: str, choices: tuple[str, ...]) -> ParameterRow:
     row = number_row(key, "", 0.0, 0.0, "bar that carries the gauge")
     return replace(row, kind="choice", choices=choices)
 
 
-def _row(key: str) -> Row:
+def _row(key: str) -> ParameterRow:
     row = find_row(key)
     if row is None:
         raise KeyError(key)

@@ -21,7 +21,7 @@ from fmu_src.native.memory import (
 from percussion_model.physics.kernel import preparing
 from percussion_model.scene.numbers import JOINT_KINDS, Numbers
 from percussion_model.scene.parameters import find_row
-from percussion_model.scene.rows import Row
+from percussion_model.scene.rows import ParameterRow
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers.state import words_of
 
@@ -33,7 +33,7 @@ AT = words_of(SCENE_NUMBERS)
 _values_at = records_at(SCENE_NUMBERS)
 
 
-def row_of(key: str) -> Row:
+def row_of(key: str) -> ParameterRow:
     """Row of the parameter table."""
     row = find_row(key)
     assert row is not None, key

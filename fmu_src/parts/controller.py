@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from copy import copy
 from typing import Any
 
-from fmu_src.parts.part import COUNT, Model, Part, PartTable
+from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
 from fmu_src.parts.seeker import FEED, PRESSURE, Seeker
 
 DRILLING, VOID, RETRACT = 0, 1, 2
@@ -186,10 +186,7 @@ class DrillController(Model):
             setattr(self.seeker, name, copy(value))
 
 
-class DrillControllerPart(Part):
-    """Controller of feed, pressure and percussion."""
-
-    MODEL = DrillController
+DrillControllerPart = slave_of(DrillController)
 
 
 TABLE = PartTable(

@@ -8,7 +8,7 @@ and F is held over a communication step on both sides: the casing feels what the
 feels, so momentum passes the interface exactly. A force that is held for a step h, and
 known to the bit a step late, brings energy into the pair unless the damper takes it:
 c > k h / 2 for the hold, 3 k h / 2 with the delay. A damper that is sampled needs
-c h well below the mass that it brakes. `Shoulder` keeps both, by less stiffness if need
+c h well below the mass that it brakes. `_shoulder` keeps both, by less stiffness if need
 be: then a free bit comes to rest at any step. No sampled force is passive for every
 partner; one that swings within a few steps has to lose a few percent a cycle, as rock does.
 """
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.parts.part import COUNT, Model, Part, PartTable, plain
+from fmu_src.parts.part import COUNT, Model, PartTable, plain, slave_of
 from fmu_src.parts.string_body import Lumps
 from fmu_src.parts.string_waves import Waves
 
@@ -36,37 +36,6 @@ ROUNDING = 1e-9
 LONGEST_LUMPED_STEP = 2e-3
 # A saved string of more rods is refused: their lumps would need matrices of this size squared.
 MOST_RODS = 2000
-
-
-class Shoulder:
-    """Spring and damper between casing and bit.
-
-    Parameters
-    ----------
-    parameters : dict
-        Of the drill string.
-    """
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        self.stiffness = parameters["shoulder.stiffness"]
-        self.damping = parameters["shoulder.damping"]
-        self.mass = parameters["shoulder.bit_mass"]
-        self.passive = parameters["shoulder.passive"]
-        self._allowed = 0.0, (self.stiffness, self.damping)  # for a step [s]
-
-    def constants(self, h: float) -> tuple[float, float]:
-        """Stiffness [N/m] and damping [N s/m] that a communication step `h` [s] allows."""
-        if h != self._allowed[0]:
-            self._allowed = h, self._limited(h)
-        return self._allowed[1]
-
-    def _limited(self, h: float) -> tuple[float, float]:
-        if not self.passive:
-            return self.stiffness, self.damping
-        most = SHARE_OF_MASS * self.mass / h
-        k = min(self.stiffness, most / (DAMPING_OF_DELAY * h))
-        c = min(max(self.damping, DAMPING_OF_DELAY * k * h), most)
-        return k, c
 
 
 class DrillString(Model):
@@ -109,17 +78,17 @@ class DrillString(Model):
         super().__init__(parameters)
         kind = {"waves": Waves, "lumped": Lumps}[parameters["model"]]
         self.body: Any = kind(parameters, int(parameters["start.rods"]))
-        self.shoulder = Shoulder(parameters)
         for name in self.STATE:
             setattr(self, name, 0.0)
         self.was_asked = False
         self._share = 0.0, 0.0  # of a step that the filter of the feed lets through
+        self._allowed = 0.0, (0.0, 0.0)  # stiffness and damping of the shoulder for a step [s]
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Stand still in balance, the shoulder loaded by `start.feed_force`."""
         self.force = self.mean_force = self.parameters["start.feed_force"]
         self.force_before = 0.0
-        self.stiffness = self.shoulder.stiffness
+        self.stiffness = self.parameters["shoulder.stiffness"]
         self.gap = self.force / self.stiffness  # compression at equal displacements [m]
         self.loaded = 0.5 * self.force**2 / self.stiffness  # energy that is there already [J]
         self.bit = inputs["bit_position"]
@@ -189,9 +158,21 @@ class DrillString(Model):
         """Displacement of the casing at the communication point [m]."""
         return self.body.casing + self.body.casing_velocity * self.lag
 
+    def _shoulder(self, h: float) -> tuple[float, float]:
+        """Stiffness [N/m] and damping [N s/m] that a communication step `h` [s] allows."""
+        p = self.parameters
+        k, c = p["shoulder.stiffness"], p["shoulder.damping"]
+        if not p["shoulder.passive"]:
+            return k, c
+        most = SHARE_OF_MASS * p["shoulder.bit_mass"] / h
+        k = min(k, most / (DAMPING_OF_DELAY * h))
+        return k, min(max(c, DAMPING_OF_DELAY * k * h), most)
+
     def _update_force(self, bit_velocity: float, bit: float, h: float) -> None:
         """Force of the shoulder for the step to come."""
-        k, c = self.shoulder.constants(h)
+        if h != self._allowed[0]:
+            self._allowed = h, self._shoulder(h)
+        k, c = self._allowed[1]
         if k != self.stiffness:
             # another step size: the same force at another stiffness
             softer = 1.0 / k - 1.0 / self.stiffness
@@ -281,10 +262,7 @@ class DrillString(Model):
             self.body.assemble()
 
 
-class DrillStringPart(Part):
-    """Drill string with head, casing and shoulder."""
-
-    MODEL = DrillString
+DrillStringPart = slave_of(DrillString)
 
 
 TABLE = PartTable(

@@ -175,6 +175,12 @@ class Part(Slave):
         self._model, self._found = model, None
 
 
+def slave_of(model: type[Model]) -> type[Part]:
+    """Slave around a model; FMUs find it in the model's module, by this name."""
+    names = {"MODEL": model, "__module__": model.__module__, "__doc__": model.__doc__}
+    return type(f"{model.__name__}Part", (Part,), names)
+
+
 @dataclass(frozen=True)
 class PartTable:
     """Description and variables of a part; SI, forces and positions down positive.

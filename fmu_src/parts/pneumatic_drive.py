@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from fmu_src.parts.part import Model, Part, PartTable
+from fmu_src.parts.part import Model, PartTable, slave_of
 
 GAS_CONSTANT = 287.0  # of air [J/(kg K)]
 AMBIENT = 101_325.0  # [Pa], absolute; pressures in the chambers are gauge
@@ -96,10 +96,7 @@ class PneumaticDrive(Model):
         }
 
 
-class PneumaticDrivePart(Part):
-    """Two chambers and a valve."""
-
-    MODEL = PneumaticDrive
+PneumaticDrivePart = slave_of(PneumaticDrive)
 
 
 # Chambers that give about the 3000 N of the reference drive at 20 bar, and fill in a few

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fmu_src.parts.part import Model, Part, PartTable
+from fmu_src.parts.part import Model, PartTable, slave_of
 
 LONGEST_STEP = 1e-3  # of the integration, short against the servo [s]
 
@@ -73,10 +73,7 @@ class RigFeed(Model):
         }
 
 
-class RigFeedPart(Part):
-    """Hydraulic cylinder that pushes the head."""
-
-    MODEL = RigFeed
+RigFeedPart = slave_of(RigFeed)
 
 
 TABLE = PartTable(

@@ -16,7 +16,7 @@ import random
 from bisect import bisect_right
 from typing import Any
 
-from fmu_src.parts.part import COUNT, Entries, Model, Part, PartTable
+from fmu_src.parts.part import COUNT, Entries, Model, PartTable, slave_of
 
 LAYERS = 6
 # Knots of the variation that are kept, by number.
@@ -115,10 +115,7 @@ class RockProfile(Model):
         }
 
 
-class RockProfilePart(Part):
-    """Rock by depth."""
-
-    MODEL = RockProfile
+RockProfilePart = slave_of(RockProfile)
 
 
 _LAYER = {

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fmu_src.parts.part import Model, Part, PartTable
+from fmu_src.parts.part import Model, PartTable, slave_of
 
 LONGEST_STEP = 1e-3  # of the integration, short against filling the hose [s]
 
@@ -81,10 +81,7 @@ class Supply(Model):
         }
 
 
-class SupplyPart(Part):
-    """Source, hose and relief valve of the drive's fluid."""
-
-    MODEL = Supply
+SupplyPart = slave_of(Supply)
 
 
 TABLE = PartTable(

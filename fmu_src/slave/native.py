@@ -189,6 +189,38 @@ class Accesses(dict[tuple[int, ...], tuple[Callable[[], int], Any]]):
         return call, values
 
 
+# Types of values in C.
+KINDS = {
+    "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
+    "String": ctypes.c_char_p,
+}  # fmt: skip
+
+
+def _getter(word: str) -> Callable[[NativeSlave, list[int]], list[Any]]:
+    """Method that returns values of variables of a type."""
+
+    def get(slave: NativeSlave, vrs: list[int]) -> list[Any]:
+        call, values = slave.getters[word][tuple(vrs)]
+        if call():
+            raise slave.refused()
+        found: list[Any] = values[:]
+        return found
+
+    return get
+
+
+def _setter(word: str) -> Callable[[NativeSlave, list[int], list[Any]], None]:
+    """Method that sets variables of a type."""
+
+    def put(slave: NativeSlave, vrs: list[int], values: list[Any]) -> None:
+        call, room = slave.setters[word][tuple(vrs)]
+        room[:] = values if word != "String" else [value.encode() for value in values]
+        if call():
+            raise slave.refused()
+
+    return put
+
+
 class NativeSlave(Hosted):
     """Passes the calls of a host on to the library."""
 
@@ -204,73 +236,27 @@ class NativeSlave(Hosted):
         )  # fmt: skip
         self._time, self._size = ctypes.c_double(), ctypes.c_double()
         self._step = partial(library.fmi2DoStep, self._pointer, self._time, self._size, 0)
-        kinds = {
-            "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
-            "String": ctypes.c_char_p,
-        }  # fmt: skip
-        self._getters, self._setters = (
+        self.getters, self.setters = (
             {
                 word: Accesses(getattr(library, f"fmi2{verb}{word}"), self._pointer, kind)
-                for word, kind in kinds.items()
+                for word, kind in KINDS.items()
             }
             for verb in ("Get", "Set")
         )
 
-    def _refused(self) -> FmuError:
+    def refused(self) -> FmuError:
         """What is to be raised after the library has refused a call, and said why."""
         self.hold()
         return FmuError(self.log_queue[-1].msg if self.log_queue else "refused")
 
     def _call(self, function: Any, *arguments: Any) -> None:
         if function(self._pointer, *arguments):
-            raise self._refused()
+            raise self.refused()
 
-    # variables
+    # values of variables by reference; enumerations are Integers, and there are no Strings
 
-    def _get(self, word: str, vrs: list[int]) -> list[Any]:
-        call, values = self._getters[word][tuple(vrs)]
-        if call():
-            raise self._refused()
-        found: list[Any] = values[:]
-        return found
-
-    def _set(self, word: str, vrs: list[int], values: list[Any]) -> None:
-        call, room = self._setters[word][tuple(vrs)]
-        room[:] = values
-        if call():
-            raise self._refused()
-
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """Values of Real variables."""
-        return self._get("Real", vrs)
-
-    def get_integer(self, vrs: list[int]) -> list[int]:
-        """Values of Integer variables and enumerations."""
-        return self._get("Integer", vrs)
-
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """Values of Boolean variables."""
-        return self._get("Boolean", vrs)
-
-    def get_string(self, vrs: list[int]) -> list[str]:
-        """Values of String variables: there are none."""
-        return self._get("String", vrs)
-
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set Real variables."""
-        self._set("Real", vrs, values)
-
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Set Integer variables and enumerations."""
-        self._set("Integer", vrs, values)
-
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """Set Boolean variables."""
-        self._set("Boolean", vrs, values)
-
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Set String variables: there are none."""
-        self._set("String", vrs, [value.encode() for value in values])
+    get_real, get_integer, get_boolean, get_string = map(_getter, KINDS)
+    set_real, set_integer, set_boolean, set_string = map(_setter, KINDS)
 
     # sequence
 
@@ -295,7 +281,7 @@ class NativeSlave(Hosted):
         self._time.value = current_time
         self._size.value = step_size
         if self._step():
-            raise self._refused()
+            raise self.refused()
         return True
 
     def terminate(self) -> None:
@@ -329,8 +315,3 @@ class NativeSlave(Hosted):
         if isinstance(state, OwnState):
             return state.to_bytes()
         return state if isinstance(state, bytes) else b""  # of another FMU: none here
-
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> bytes:
-        # looked at when it is set: an error here would bring the export library down
-        return state

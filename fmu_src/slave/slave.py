@@ -45,6 +45,26 @@ REAL, INTEGER, BOOLEAN, STRING = ("Real",), ("Integer", "Enumeration"), ("Boolea
 Read = Callable[[Any], list[Any]]
 
 
+def _getter(types: tuple[str, ...]) -> Callable[[Slave, list[int]], list[Any]]:
+    """Method that returns values of variables of some types."""
+
+    @guarded
+    def get(slave: Slave, vrs: list[int]) -> list[Any]:
+        return slave._get(vrs, types)
+
+    return get
+
+
+def _setter(types: tuple[str, ...]) -> Callable[[Slave, list[int], list[Any]], None]:
+    """Method that sets variables of some types."""
+
+    @guarded
+    def put(slave: Slave, vrs: list[int], values: list[Any]) -> None:
+        slave._set(vrs, [*map(bool, values)] if types is BOOLEAN else values, types)
+
+    return put
+
+
 class Slave(Hosted):
     """Base of the slaves.
 
@@ -171,11 +191,6 @@ class Slave(Hosted):
                         self.unchecked.append(name)
         self.pending.clear()
 
-    def renew_inputs(self) -> None:
-        """Take all inputs as new in the next step."""
-        self.unchecked = [one.name for one in self.inputs]
-        self.new.update(self.unchecked)
-
     def _reader_of(self, references: list[int], types: tuple[str, ...]) -> Read:
         """What reads these variables; raises ValueError if there is one that is not known."""
         found = [self._variable(reference, types) for reference in references]
@@ -244,20 +259,8 @@ class Slave(Hosted):
         except Exception as error:
             raise self.fatal(error) from None
 
-    @guarded
-    def get_integer(self, vrs: list[int]) -> list[int]:
-        """Values of Integer variables and enumerations."""
-        return self._get(vrs, INTEGER)
-
-    @guarded
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """Values of Boolean variables."""
-        return self._get(vrs, BOOLEAN)
-
-    @guarded
-    def get_string(self, vrs: list[int]) -> list[str]:
-        """Values of String variables: there are none."""
-        return self._get(vrs, STRING)
+    get_integer, get_boolean, get_string = map(_getter, (INTEGER, BOOLEAN, STRING))
+    set_integer, set_boolean, set_string = map(_setter, (INTEGER, BOOLEAN, STRING))
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set Real variables."""
@@ -271,21 +274,6 @@ class Slave(Hosted):
                 self._set(vrs, values, REAL)
         except Exception as error:
             raise self.fatal(error) from None
-
-    @guarded
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Set Integer variables and enumerations."""
-        self._set(vrs, values, INTEGER)
-
-    @guarded
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """Set Boolean variables."""
-        self._set(vrs, [bool(value) for value in values], BOOLEAN)
-
-    @guarded
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Set String variables: there are none."""
-        self._set(vrs, values, STRING)
 
     # the calls of a host: sequence
 
@@ -425,13 +413,9 @@ class Slave(Hosted):
         self.values |= values
         self.phase, self.is_set_up = place.phase, place.is_set_up
         self.start_time, self.now = place.start_time, place.now
-        self.renew_inputs()
+        self.unchecked = [one.name for one in self.inputs]  # all are new in the next step
+        self.new.update(self.unchecked)
 
     @staticmethod
     def _fmu_state_to_bytes(state: Any) -> bytes:
         return state if isinstance(state, bytes) else b""  # of another FMU: none here
-
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> bytes:
-        # looked at when it is set: an error here would bring the export library down
-        return state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from fmu_src.archive import write_archive
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
+from percussion_model.coupling.ssp import FMU
+from percussion_model.coupling.ssp_xml import SPACES, tag
 from percussion_model.scene.presets import scenario_folder, scene_file, system_file
 from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import said_among, shortened, show_value, unprintable
@@ -34,12 +37,7 @@ _TABLES = {"components": str, "connections": str, "parameters": dict}
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 MOST_BASES = 5
 
-_SPACES = {
-    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
-    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
-    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
-    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
-}
+_OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 _TYPES = {"Real": "Real", "Integer": "Integer", "Boolean": "Boolean", "Enumeration": "Integer"}
 
 
@@ -230,12 +228,13 @@ def _check(plan: SystemPlan, variables: dict[str, dict[str, Any]]) -> None:
                 raise SystemPlanError(f"parameter {component}.{name} = {shown}: must be a number")
 
 
-def _tag(space: str, name: str) -> str:
-    return f"{{{_SPACES[space]}}}{name}"
+def _add(parent: Element, space: str, word: str, /, **attributes: str) -> Element:
+    """Add an element to another one."""
+    return SubElement(parent, tag(space, word), attributes)
 
 
 def _text(root: Element) -> bytes:
-    for prefix, address in _SPACES.items():
+    for prefix, address in (SPACES | {"oms": _OMS}).items():
         register_namespace(prefix, address)
     indent(root, space="  ")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
@@ -245,80 +244,73 @@ def _structure(
     plan: SystemPlan, fmus: dict[str, Path], variables: dict[str, dict[str, Any]]
 ) -> bytes:
     root = Element(
-        _tag("ssd", "SystemStructureDescription"),
+        tag("ssd", "SystemStructureDescription"),
         {"version": "1.0", "name": plan.name, "description": plan.description},
     )
-    system = SubElement(root, _tag("ssd", "System"), {"name": plan.name})
-    elements = SubElement(system, _tag("ssd", "Elements"))
+    system = _add(root, "ssd", "System", name=plan.name)
+    elements = _add(system, "ssd", "Elements")
     used = [*plan.connections, *plan.connections.values()]
     units: set[str] = set()
     for component, fmu in fmus.items():
-        node = SubElement(
-            elements, _tag("ssd", "Component"),
-            {"name": component, "type": "application/x-fmu-sharedlibrary",
-             "source": f"resources/{fmu.name}"},
-        )  # fmt: skip
-        connectors = SubElement(node, _tag("ssd", "Connectors"))
+        file = f"resources/{fmu.name}"
+        node = _add(elements, "ssd", "Component", name=component, type=FMU, source=file)
+        connectors = _add(node, "ssd", "Connectors")
         for name, one in variables[component].items():
             if f"{component}.{name}" not in used:
                 continue
-            connector = SubElement(
-                connectors, _tag("ssd", "Connector"), {"name": name, "kind": one.causality}
-            )
+            connector = _add(connectors, "ssd", "Connector", name=name, kind=one.causality)
             unit = {"unit": one.unit} if one.type == "Real" else {}
-            SubElement(connector, _tag("ssc", _TYPES[one.type]), unit)
+            _add(connector, "ssc", _TYPES[one.type], **unit)
             units.update(unit.values())
         if component in plan.parameters:
-            bindings = SubElement(node, _tag("ssd", "ParameterBindings"))
-            SubElement(bindings, _tag("ssd", "ParameterBinding"),
-                       {"source": f"resources/{component}.ssv"})  # fmt: skip
-    connections = SubElement(system, _tag("ssd", "Connections"))
+            bindings = _add(node, "ssd", "ParameterBindings")
+            _add(bindings, "ssd", "ParameterBinding", source=f"resources/{component}.ssv")
+    connections = _add(system, "ssd", "Connections")
     for sink, source in plan.connections.items():
         (a, x), (b, y) = split(source), split(sink)
-        SubElement(
-            connections, _tag("ssd", "Connection"),
-            {"startElement": a, "startConnector": x, "endElement": b, "endConnector": y},
-        )  # fmt: skip
+        ends = {"startElement": a, "startConnector": x, "endElement": b, "endConnector": y}
+        _add(connections, "ssd", "Connection", **ends)
     _annotate(system, plan.step)
     _units(root, units)
-    SubElement(root, _tag("ssd", "DefaultExperiment"),
-               {"startTime": "0.0", "stopTime": repr(plan.duration)})  # fmt: skip
+    _add(root, "ssd", "DefaultExperiment", startTime="0.0", stopTime=repr(plan.duration))
     return _text(root)
 
 
 def _annotate(system: Element, step: float) -> None:
     """The step size, in the place where OMSimulator looks for it; others pass it over."""
-    annotations = SubElement(system, _tag("ssd", "Annotations"))
-    one = SubElement(annotations, _tag("ssc", "Annotation"), {"type": "org.openmodelica"})
-    inner = SubElement(SubElement(one, _tag("oms", "Annotations")),
-                       _tag("oms", "SimulationInformation"))  # fmt: skip
+    annotations = _add(system, "ssd", "Annotations")
+    one = _add(annotations, "ssc", "Annotation", type="org.openmodelica")
+    inner = SubElement(
+        SubElement(one, f"{{{_OMS}}}Annotations"), f"{{{_OMS}}}SimulationInformation"
+    )
     SubElement(
-        inner, _tag("oms", "FixedStepMaster"),
+        inner, f"{{{_OMS}}}FixedStepMaster",
         {"description": "oms-ma", "stepSize": repr(step), "absoluteTolerance": "0.000100",
          "relativeTolerance": "0.000100"},
     )  # fmt: skip
 
 
 def _units(root: Element, names: set[str]) -> None:
-    node = SubElement(root, _tag("ssd", "Units"))
+    node = _add(root, "ssd", "Units")
     for name in sorted(names):
-        unit = SubElement(node, _tag("ssc", "Unit"), {"name": name})
         base = {key: str(power) for key, power in UNITS[name].base.items()}
-        SubElement(unit, _tag("ssc", "BaseUnit"), base)
+        _add(_add(node, "ssc", "Unit", name=name), "ssc", "BaseUnit", **base)
+
+
+_WRITTEN: dict[str, Callable[[Any], str]] = {
+    "Real": lambda value: repr(float(value)),
+    "Integer": lambda value: str(int(value)),
+    "Boolean": lambda value: str(bool(value)).lower(),
+}
 
 
 def _values(values: dict[str, Any], variables: dict[str, Any]) -> bytes:
-    root = Element(_tag("ssv", "ParameterSet"), {"version": "1.0", "name": PARAMETER_SET})
-    parameters = SubElement(root, _tag("ssv", "Parameters"))
+    root = Element(tag("ssv", "ParameterSet"), {"version": "1.0", "name": PARAMETER_SET})
+    parameters = _add(root, "ssv", "Parameters")
     for name, value in values.items():
-        kind = variables[name].type
-        node = SubElement(parameters, _tag("ssv", "Parameter"), {"name": name})
-        if kind == "Boolean":
-            SubElement(node, _tag("ssv", "Boolean"), {"value": str(bool(value)).lower()})
-        elif kind == "Real":
-            SubElement(node, _tag("ssv", "Real"), {"value": repr(float(value))})
-        else:
-            SubElement(node, _tag("ssv", "Integer"), {"value": str(int(value))})
+        kind = _TYPES[variables[name].type]
+        parameter = _add(parameters, "ssv", "Parameter", name=name)
+        _add(parameter, "ssv", kind, value=_WRITTEN[kind](value))
     return _text(root)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,8 +22,8 @@ from percussion_model.simulation.warnings import unused_note
 __all__ = [
     "NOISE",
     "EffectsStudy",
-    "Trial",
     "Variant",
+    "VariantRun",
     "effect_variants",
     "step_costs",
     "study_effects",
@@ -127,8 +127,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     effects = scene.effects
     yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
     for name in ("gravity", "feed", *(one.name for one in COMPONENTS)):
-        is_on = getattr(effects, name)
-        yield Variant(name, "off" if is_on else "on", {f"effects.{name}": not is_on}, off=is_on)
+        yield _switched(name, getattr(effects, name))
     yield from _drive(scene)
     yield from _rock(scene)
     yield from _bars(scene)
@@ -137,6 +136,16 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
         is_on = scene.solver.leaps
         # Leaps are no effect but an accelerator: a step without them is the same step.
         yield Variant(LEAPS, "off" if is_on else "on", {"solver.leaps": not is_on})
+
+
+def _switched(
+    effect: str, is_on: bool, needs: Mapping[str, Any] | None = None, words: str = "on"
+) -> Variant:
+    """An effect turned off; or on, with values that it needs."""
+    key = f"effects.{effect}"
+    if is_on:
+        return Variant(effect, "off", {key: False}, off=True)
+    return Variant(effect, words, {key: True, **(needs or {})})
 
 
 def _drive(scene: Scene) -> Iterator[Variant]:
@@ -149,18 +158,12 @@ def _drive(scene: Scene) -> Iterator[Variant]:
 def _rock(scene: Scene) -> Iterator[Variant]:
     rock = scene.effects.rock
     if scene.matters("rock.unloading_ratio"):
-        if scene.barrier_on:
-            yield Variant("barrier", "off", {"effects.barrier": False}, off=True)
-        else:
-            yield Variant("barrier", "on", {"effects.barrier": True, **_not_zero(scene, _BARRIER)})
+        yield _switched("barrier", scene.barrier_on, _not_zero(scene, _BARRIER))
         other = "paper" if scene.effects.standstill_tension == "release" else "release"
         words = "as in the paper" if other == "paper" else "released"
         yield Variant("standstill tension", words, {"effects.standstill_tension": other})
         yield from _power_law(scene)
-        if scene.cuttings_on:
-            yield Variant("cuttings", "off", {"effects.cuttings": False}, off=True)
-        else:
-            yield Variant("cuttings", "half removed", {"effects.cuttings": True, **_HALF_REMOVED})
+        yield _switched("cuttings", scene.cuttings_on, _HALF_REMOVED, "half removed")
         yield Variant(
             "rock law",
             "linear spring",
@@ -194,11 +197,7 @@ def _power_law(scene: Scene) -> Iterator[Variant]:
 
 def _bars(scene: Scene) -> Iterator[Variant]:
     if scene.bit.model == "elastic":
-        if scene.loss_on:
-            yield Variant("loss", "off", {"effects.loss": False}, off=True)
-        else:
-            changes = {"effects.loss": True, **_not_zero(scene, ("loss.time",))}
-            yield Variant("loss", "on", changes)
+        yield _switched("loss", scene.loss_on, _not_zero(scene, ("loss.time",)))
         if scene.piston.model == "elastic":
             yield Variant("piston", "rigid", {"piston.model": "rigid"}, off=True)
         elif scene.piston.model == "rigid":
@@ -214,14 +213,10 @@ def _bars(scene: Scene) -> Iterator[Variant]:
 
 def _string(scene: Scene) -> Iterator[Variant]:
     """Effects of a drill string."""
-    if not scene.effects.string:
-        return
-    named = {"damper": True, "joints": any(rod.joint != "perfect" for rod in scene.string.rods)}
-    for name in ("joints", "damper"):
-        is_on = getattr(scene.effects, name)
-        if named[name]:
-            words = "off" if is_on else "on"
-            yield Variant(name, words, {f"effects.{name}": not is_on}, off=is_on)
+    if scene.effects.string:
+        if any(rod.joint != "perfect" for rod in scene.string.rods):
+            yield _switched("joints", scene.effects.joints)
+        yield _switched("damper", scene.effects.damper)
 
 
 def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
@@ -230,7 +225,7 @@ def _not_zero(scene: Scene, keys: tuple[str, ...]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Trial:
+class VariantRun:
     """One variant of a scene.
 
     Attributes
@@ -334,16 +329,16 @@ class EffectsStudy:
     Attributes
     ----------
     scene : Scene
-    base : Trial
+    base : VariantRun
         The scene as it is.
-    trials : list of Trial
+    trials : list of VariantRun
     refused : dict of str
         Effects that cannot be changed in this scene, and why.
     """
 
     scene: Scene
-    base: Trial = field(repr=False)
-    trials: list[Trial] = field(repr=False)
+    base: VariantRun = field(repr=False)
+    trials: list[VariantRun] = field(repr=False)
     refused: dict[str, str] = field(repr=False)
 
     @property
@@ -351,7 +346,7 @@ class EffectsStudy:
         """Numbers whose change is shown: `CHANGED`, or `CHANGED_OF_FALL`."""
         return CHANGED_OF_FALL if self.base.falls else CHANGED
 
-    def change(self, trial: Trial, name: str) -> Change:
+    def change(self, trial: VariantRun, name: str) -> Change:
         """Change of a number of `changed` against the scene itself.
 
         Leaps go over the same grid: whatever it puts off is in both runs, and scatter is left.
@@ -362,16 +357,16 @@ class EffectsStudy:
             return replace(found, hidden=True)
         return found
 
-    def changes(self, trial: Trial) -> dict[str, float | None]:
+    def changes(self, trial: VariantRun) -> dict[str, float | None]:
         """Relative change of each number of `changed`; None where there is none that counts."""
         found = {name: self.change(trial, name) for name in self.changed}
         return {name: None if one.hidden else one.value for name, one in found.items()}
 
-    def change_errors(self, trial: Trial) -> dict[str, float | None]:
+    def change_errors(self, trial: VariantRun) -> dict[str, float | None]:
         """Errors of `changes`, by grid and scatter of both runs; None where it is not known."""
         return {name: self.change(trial, name).error for name in self.changed}
 
-    def undecided(self, trial: Trial) -> list[str]:
+    def undecided(self, trial: VariantRun) -> list[str]:
         """Numbers of `changed` whose change is within what is known of its error."""
         return [name for name in self.changed if self.change(trial, name).is_undecided]
 
@@ -396,7 +391,7 @@ class EffectsStudy:
             ]
         return texts
 
-    def is_costlier(self, trial: Trial) -> bool:
+    def is_costlier(self, trial: VariantRun) -> bool:
         """Whether turning an effect off made a step costlier, beyond noise."""
         if not trial.variant.off or trial.step is None or self.base.step is None:
             return False
@@ -474,7 +469,7 @@ def study_effects(
         progress("time steps", len(cases) / (len(cases) + 1))
     steps = step_costs([changed for _, changed in cases])
     trials = [
-        Trial(variant, result, wall, step)
+        VariantRun(variant, result, wall, step)
         for (variant, _), (result, wall), step in zip(cases, found, steps, strict=True)
     ]
     return EffectsStudy(scene, trials[0], trials[1:], refused)

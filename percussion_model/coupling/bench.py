@@ -49,7 +49,7 @@ SIGNALS = (
 
 
 @dataclass(frozen=True)
-class Trial:
+class StandardRun:
     """A standard run: parameters of the system, and disturbances of its signals."""
 
     name: str
@@ -95,30 +95,32 @@ def _layer(number: int, top: float, **values: float) -> dict[str, float]:
 
 
 _ONE_ROCK = {**_layer(1, 0.0, loading_stiffness=7.5e8), **_layer(2, -1.0), **_layer(3, -1.0)}
-TRIALS = (
-    Trial(
+STANDARD_RUNS = (
+    StandardRun(
         "collaring", "the feed begins at a third", 3.0,
         {**_ONE_ROCK, "string.start.feed_force": 1000.0},
     ),
-    Trial(
+    StandardRun(
         "hard", "rock three times as stiff", 4.0,
         {**_ONE_ROCK, **_layer(1, 0.0, loading_stiffness=4e8),
          **_layer(2, 0.035, loading_stiffness=1.2e9)},
     ),
-    Trial(
+    StandardRun(
         "soft", "rock a third as stiff", 4.0,
         {**_ONE_ROCK, **_layer(1, 0.0, loading_stiffness=1.2e9),
          **_layer(2, 0.02, loading_stiffness=4e8)},
     ),
-    Trial(
+    StandardRun(
         "void", "twenty centimetres of filling with 1 kN/mm", 4.0,
         {**_ONE_ROCK, **_layer(2, 0.02, loading_stiffness=1e6),
          **_layer(3, 0.22, loading_stiffness=7.5e8)},
     ),
-    Trial("pressure", "half of the pressure is lost for 1.5 s", 4.0, _ONE_ROCK, _pressure_loss),
-    Trial("rod", "a rod is added", 4.0, {**_ONE_ROCK, "string.start.rod_left": 0.03}),
-    Trial("sensors", "5 % of noise, 30 ms late", 4.0, _ONE_ROCK, _bad_sensors),
-    Trial(
+    StandardRun(
+        "pressure", "half of the pressure is lost for 1.5 s", 4.0, _ONE_ROCK, _pressure_loss,
+    ),
+    StandardRun("rod", "a rod is added", 4.0, {**_ONE_ROCK, "string.start.rod_left": 0.03}),
+    StandardRun("sensors", "5 % of noise, 30 ms late", 4.0, _ONE_ROCK, _bad_sensors),
+    StandardRun(
         "jam", "a centimetre of rock that holds the bit", 4.0,
         {**_ONE_ROCK, **_layer(2, 0.03, torque_factor=3.0), **_layer(3, 0.04)},
     ),
@@ -159,7 +161,7 @@ class Score:
     doubt: str = ""
 
 
-def judge(trial: Trial, run: CoupledRun) -> Score:
+def judge(trial: StandardRun, run: CoupledRun) -> Score:
     """Score of a run."""
     time = run["time"]
     steps = np.diff(time, prepend=0.0)
@@ -289,11 +291,11 @@ def bench(
     tell : callable, optional
         As for `Coupling.run`.
     """
-    names = [trial.name for trial in TRIALS]
+    names = [trial.name for trial in STANDARD_RUNS]
     for name in trials:
         if name not in names:
             raise CouplingError(f"there is no run {name}: there are {', '.join(names)}")
-    chosen = [trial for trial in TRIALS if not trials or trial.name in trials]
+    chosen = [trial for trial in STANDARD_RUNS if not trials or trial.name in trials]
     steps = (STEP, FINER * STEP) if check_step else (STEP,)
     whole = len(steps) * sum(trial.duration for trial in chosen)
     kept = kept_values(controller)

@@ -47,15 +47,15 @@ _BYTE, _WORD, _INT, _DOUBLE = (
 )  # fmt: skip
 
 
-def _called(parameters: Sequence[Any], pointers: Sequence[bool]) -> Any:
+def _called(*parameters: Any) -> Any:
     """Code that calls a function at an address, its first argument, with the others."""
     shape = ir.FunctionType(_INT, parameters)
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         function = builder.inttoptr(arguments[0], shape.as_pointer())
         given = [
-            builder.inttoptr(one, _BYTE) if is_pointer else one
-            for one, is_pointer in zip(arguments[1:], pointers, strict=True)
+            builder.inttoptr(one, _BYTE) if kind is _BYTE else one
+            for one, kind in zip(arguments[1:], parameters, strict=True)
         ]
         return builder.call(function, given)
 
@@ -68,9 +68,7 @@ def exchange(
 ) -> tuple[Any, Any]:
     """Call a getter or a setter of an FMU; all arguments are addresses but for the count."""
     word = types.int64
-    return types.int32(word, word, word, word, word), _called(
-        (_BYTE, _BYTE, _WORD, _BYTE), (True, True, False, True)
-    )
+    return types.int32(word, word, word, word, word), _called(_BYTE, _BYTE, _WORD, _BYTE)
 
 
 @intrinsic
@@ -78,9 +76,9 @@ def do_step(
     typing: Any, function: Any, component: Any, time: Any, step: Any, forward: Any
 ) -> tuple[Any, Any]:
     """Call `fmi2DoStep`."""
-    return types.int32(
-        types.int64, types.int64, types.float64, types.float64, types.int32
-    ), _called((_BYTE, _DOUBLE, _DOUBLE, _INT), (True, False, False, False))
+    word, real = types.int64, types.float64
+    shape = types.int32(word, word, real, real, types.int32)
+    return shape, _called(_BYTE, _DOUBLE, _DOUBLE, _INT)
 
 
 class At(IntEnum):

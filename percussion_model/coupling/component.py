@@ -192,6 +192,8 @@ class Exchange:
     ----------
     component : Component
     names : sequence of str
+    kind : str
+        "Get" or "Set".
 
     Attributes
     ----------
@@ -201,54 +203,32 @@ class Exchange:
         Families with what calls them.
     """
 
-    kind = ""  # "Get" or "Set"
-
-    def __init__(self, component: Component, names: Sequence[str]) -> None:
-        found: dict[str, list[str]] = {}
-        for name in names:
-            found.setdefault(component.family(name), []).append(name)
+    def __init__(self, component: Component, names: Sequence[str], kind: str) -> None:
         self.component = component
         self.names: list[str] = []
         self.groups: list[Group] = []
+        families = [component.family(name) for name in names]
         for family in ORDER:
-            if family in found:
-                group = Group(component, family, found[family], self.kind, len(self.names))
-                self.groups.append(group)
-                self.names += found[family]
-
-
-class Reader(Exchange):
-    """Reads variables of an FMU."""
-
-    kind = "Get"
+            own = [name for name, of in zip(names, families, strict=True) if of == family]
+            if own:
+                self.groups.append(Group(component, family, own, kind, len(self.names)))
+                self.names += own
+        self.forget()
 
     def read(self) -> list[Any]:
         """Present values."""
         found: list[Any] = []
         for group in self.groups:
-            status = group.call(*group.arguments)
-            if status > WARNING:
-                self.component.fail(group.name, status)
+            self._call(group)
             found += map(bool, group.found()) if group.family == "Boolean" else group.found()
         return found
 
-
-class Writer(Exchange):
-    """Sets variables of an FMU; a family whose values are as before is left alone."""
-
-    kind = "Set"
-
-    def __init__(self, component: Component, names: Sequence[str]) -> None:
-        super().__init__(component, names)
-        self._last: list[Any] = []
-        self.forget()
-
     def forget(self) -> None:
         """Set all values the next time: the FMU may have others than were set last."""
-        self._last = [None for _ in self.groups]
+        self._last: list[Any] = [None for _ in self.groups]
 
     def write(self, values: Sequence[Any]) -> None:
-        """Set values, in the order of the names."""
+        """Set values, in the order of the names; a family that is as before is left alone."""
         for k, group in enumerate(self.groups):
             chosen = values[group.begin : group.end]
             if chosen == self._last[k]:
@@ -258,10 +238,13 @@ class Writer(Exchange):
             except struct.error:
                 self.component.refuse_large(self.names[group.begin : group.end], chosen)
                 raise
-            status = group.call(*group.arguments)
-            if status > WARNING:
-                self.component.fail(group.name, status)
+            self._call(group)
             self._last[k] = chosen
+
+    def _call(self, group: Group) -> None:
+        status = group.call(*group.arguments)
+        if status > WARNING:
+            self.component.fail(group.name, status)
 
 
 class Component:
@@ -283,15 +266,16 @@ class Component:
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
         self.can_vary = bool(description.coSimulation.canHandleVariableCommunicationStepSize)
-        self.messages: list[tuple[int, str]] = []
+        self.messages: list[str] = []
+        self.faults: list[str] = []  # those of them that are errors
         # both have to live as long as the instance
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = self._logger
-        self._slave: Any = None
+        self.slave: Any = None
         try:
             with contextlib.chdir("."):  # fmpy stays in the folder of a library that fails
-                self._slave = FMU2Slave(
+                self.slave = FMU2Slave(
                     guid=description.guid,
                     unzipDirectory=folder,
                     modelIdentifier=description.coSimulation.modelIdentifier,
@@ -302,8 +286,8 @@ class Component:
             raise CouplingError(
                 f"{name}: the library of its FMU cannot be loaded: {text}"
             ) from error
-        self._guarded(self._slave.instantiate, callbacks=self._callbacks, loggingOn=True)
-        self.pointer = ctypes.c_void_p(self._slave.component)
+        self._guarded(self.slave.instantiate, callbacks=self._callbacks, loggingOn=True)
+        self.pointer = ctypes.c_void_p(self.slave.component)
         self.stepper = self.function(
             "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
         )
@@ -312,12 +296,14 @@ class Component:
     def function(self, name: str, *types: Any) -> Any:
         """A function of the library that returns a status; without types, by those of ctypes."""
         # an object of its own, since fmpy gives types to that of the library
-        return ctypes.cast(getattr(self._slave.dll, name), ctypes.CFUNCTYPE(ctypes.c_int, *types))
+        return ctypes.cast(getattr(self.slave.dll, name), ctypes.CFUNCTYPE(ctypes.c_int, *types))
 
     def _note(
         self, environment: Any, name: bytes, status: int, category: bytes, text: bytes
     ) -> None:
-        self.messages.append((status, text.decode("utf-8", "replace")))
+        self.messages.append(text.decode("utf-8", "replace"))
+        if status > WARNING:
+            self.faults.append(self.messages[-1])
 
     def find(self, name: str) -> Any:
         """A variable by name; the error suggests another one."""
@@ -342,7 +328,7 @@ class Component:
             if isinstance(value, str):
                 value = number_of_word(self.name, one, value)
             converted = self._converted(one, family, value)
-            setter = getattr(self._slave, f"set{family}")
+            setter = getattr(self.slave, f"set{family}")
             self._guarded(setter, [one.valueReference], [converted])
 
     def _converted(self, one: Any, family: str, value: Any) -> Any:
@@ -361,26 +347,26 @@ class Component:
             raise CouplingError(f"{self.name}.{one.name} = {value!r}: must be of type {one.type}")
         return converted
 
-    def reader(self, names: Sequence[str]) -> Reader:
+    def reader(self, names: Sequence[str]) -> Exchange:
         """Return a reader of these variables, all at once."""
-        return Reader(self, names)
+        return Exchange(self, names, "Get")
 
-    def writer(self, names: Sequence[str]) -> Writer:
+    def writer(self, names: Sequence[str]) -> Exchange:
         """Return a writer of these variables, all at once."""
-        return Writer(self, names)
+        return Exchange(self, names, "Set")
 
     def begin(self, time: float) -> None:
         """Enter the initialisation."""
-        self._guarded(self._slave.setupExperiment, startTime=time)
-        self._guarded(self._slave.enterInitializationMode)
+        self._guarded(self.slave.setupExperiment, startTime=time)
+        self._guarded(self.slave.enterInitializationMode)
 
     def compilation(self) -> list[str]:
         """What the FMU has logged of kernels that it is going to compile."""
-        return [text for _, text in self.messages if COMPILING in text]
+        return [text for text in self.messages if COMPILING in text]
 
     def end_initialisation(self) -> None:
         """Leave the initialisation."""
-        self._guarded(self._slave.exitInitializationMode)
+        self._guarded(self.slave.exitInitializationMode)
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
@@ -391,15 +377,15 @@ class Component:
     def save(self) -> Any:
         """State of the instance, to be given back by `drop`."""
         self._no_rollback = 0
-        return self._guarded(self._slave.getFMUstate)
+        return self._guarded(self.slave.getFMUstate)
 
     def restore(self, state: Any) -> None:
         """Go back to a state."""
-        self._guarded(self._slave.setFMUstate, state)
+        self._guarded(self.slave.setFMUstate, state)
 
     def drop(self, state: Any) -> None:
         """Give the memory of a state back."""
-        self._guarded(self._slave.freeFMUstate, state)
+        self._guarded(self.slave.freeFMUstate, state)
 
     def _guarded(self, call: Any, *arguments: Any, **named: Any) -> Any:
         """Call, and put what the FMU logged into the error."""
@@ -420,12 +406,11 @@ class Component:
 
     def _error(self, text: str) -> CouplingError:
         # the line of the FMU itself comes first, that of its export library after it
-        logged = [text for status, text in self.messages if status > WARNING and text.strip()]
-        text = logged[0].removeprefix(f"{self.name}: ") if logged else text
-        return CouplingError(f"{self.name}: {text}")
+        logged = next(filter(str.strip, self.faults), text)
+        return CouplingError(f"{self.name}: {logged.removeprefix(f'{self.name}: ')}")
 
     def free(self) -> None:
         """End the instance."""
-        if self._slave is not None:
-            self._slave.freeInstance()
-            self._slave = None
+        if self.slave is not None:
+            self.slave.freeInstance()
+            self.slave = None

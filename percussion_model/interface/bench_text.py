@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from percussion_model.coupling.bench import (
+    STANDARD_RUNS,
     STEP,
-    TRIALS,
     WITHIN_A_BLOW,
     Score,
     mean_points,
@@ -27,7 +27,7 @@ COLUMNS = (
     ("violations", "beyond limits [s]", 1.0, "time beyond the limits of feed and torque"),
 )
 # What happens in each run.
-TEXTS = {trial.name: trial.text for trial in TRIALS}
+TEXTS = {trial.name: trial.text for trial in STANDARD_RUNS}
 # A smaller error, by the number, does not show in three digits.
 SMALL = 5e-4
 # Points have one decimal; with an error that could change it they have more.

@@ -10,7 +10,7 @@ from percussion_model.scene.rows import (
     REFUSED,
     Faults,
     Needs,
-    Row,
+    ParameterRow,
     generic_key,
     nearest,
     show_value,
@@ -50,7 +50,7 @@ class Parameters:
     key: ClassVar[str] = ""  # of the group in a scene
     # says that a key is not known; the whole table does
     say_unknown: ClassVar[Callable[[str], str]] = staticmethod("unknown key {}".format)
-    rows: ClassVar[dict[str, Row]] = {}  # by the name of the field
+    rows: ClassVar[dict[str, ParameterRow]] = {}  # by the name of the field
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     _defaults: ClassVar[dict[str, Any]] = {}
     _given: frozenset[str]
@@ -115,7 +115,7 @@ LISTED: dict[str, type[Parameters]] = {}
 MOST_LISTED: dict[str, int] = {}
 
 
-def _entries(row: Row, key: str, value: Any, faults: Faults) -> tuple[Parameters, ...]:
+def _entries(row: ParameterRow, key: str, value: Any, faults: Faults) -> tuple[Parameters, ...]:
     """Read a list of tables; empty where it is none."""
     try:
         found = [] if isinstance(value, (str, bytes, Mapping)) else list(value)
@@ -129,7 +129,7 @@ def _entries(row: Row, key: str, value: Any, faults: Faults) -> tuple[Parameters
     return tuple(LISTED[row.kind].read(one, f"{key}.{k}", faults) for k, one in enumerate(found))
 
 
-def _refuse_many(row: Row, key: str, count: int, most: int) -> str:
+def _refuse_many(row: ParameterRow, key: str, count: int, most: int) -> str:
     return f"{key}: {count} {row.kind}: must be at most {most}"
 
 
@@ -137,5 +137,5 @@ def _refuse_table(key: str, value: Any, wanted: str) -> str:
     return f"{key} = {show_value(value)}: must be {wanted}"
 
 
-def _refuse_missing(row: Row, key: str) -> str:
+def _refuse_missing(row: ParameterRow, key: str) -> str:
     return f"{key} is missing: must be {row.allowed}"

@@ -51,7 +51,7 @@ from percussion_model.scene.retired import BLOW_MAP, BLOW_MAP_TABLE
 from percussion_model.scene.rows import (
     SIMILAR_ENOUGH,
     Needs,
-    Row,
+    ParameterRow,
     SceneError,
     choice,
     count,
@@ -285,7 +285,7 @@ class Start(Parameters):
 
 
 # Of the scene itself, beside its title: no solver takes it and no FMU has it.
-HOLE_DIAMETER: Row = dataclasses.replace(
+HOLE_DIAMETER: ParameterRow = dataclasses.replace(
     quantity(
         None,
         "m",
@@ -483,12 +483,12 @@ globals().update({group.__name__: group for group in GROUPS.values()})
 
 
 @cache
-def parameter_table() -> tuple[Row, ...]:
+def parameter_table() -> tuple[ParameterRow, ...]:
     """Return a row for each parameter, in the order of a scene file."""
     return tuple(table_of(GROUPS))
 
 
-def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
+def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
     """Go through the rows of groups; keys of sections have a `*` for their number."""
     for key, group in groups.items():
         for name, row in group.rows.items():
@@ -498,12 +498,12 @@ def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[Row]:
 
 
 @cache
-def rows_by_key() -> Mapping[str, Row]:
+def rows_by_key() -> Mapping[str, ParameterRow]:
     """Return the rows of `parameter_table` by their dotted keys, and `HOLE_DIAMETER`."""
     return {row.key: row for row in (HOLE_DIAMETER, *parameter_table())}
 
 
-def find_row(key: str) -> Row | None:
+def find_row(key: str) -> ParameterRow | None:
     """Find the row of a dotted key, `piston.sections.0.length` included."""
     return rows_by_key().get(generic_key(key))
 

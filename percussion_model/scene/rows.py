@@ -33,7 +33,7 @@ SIMILAR_ENOUGH = 0.6
 _MOST_FAULTS = 30
 # No characters by Unicode, and refused by XML.
 NO_XML = "\ufffe\uffff"
-# What `Row.read` returns for a value that is not allowed.
+# What `ParameterRow.read` returns for a value that is not allowed.
 REFUSED = object()
 
 
@@ -42,7 +42,7 @@ class SceneError(ValueError):
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """One parameter.
 
     Keys of bars and sections have a `*` for their number, counted from 0. `typical` is where
@@ -187,7 +187,7 @@ def _declare(
     typical: tuple[float, float] | None = None,
 ) -> Any:
     low, high = bounds.get("gt", bounds.get("ge")), bounds.get("lt", bounds.get("le"))
-    row = Row(
+    row = ParameterRow(
         key="",
         kind=kind,
         unit=unit,
@@ -273,7 +273,7 @@ def said_among(name: str, known: Collection[str]) -> str:
     return f"did you mean {near}? Known are {names}" if near else f"known are {names}"
 
 
-def refuse_value(row: Row, key: str, value: Any) -> str:
+def refuse_value(row: ParameterRow, key: str, value: Any) -> str:
     """Say that a value is not allowed, and what is."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     unit = unit_suffix(row.unit) if number else ""

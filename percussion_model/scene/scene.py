@@ -35,7 +35,7 @@ from percussion_model.scene.retired import BLOW_MAP_TABLE
 from percussion_model.scene.rows import (
     REFUSED,
     Faults,
-    Row,
+    ParameterRow,
     SceneError,
     show_value,
     unprintable,
@@ -299,7 +299,7 @@ class Scene:
         """Those of `unused` that had no effect either before `computed_by` changed the solver."""
         return tuple(key for key in self.unused if key not in self._set_aside)
 
-    def row_of(self, key: str) -> Row:
+    def row_of(self, key: str) -> ParameterRow:
         """Row of a dotted key in the parameter table."""
         row = find_row(key)
         if row is None:
@@ -437,7 +437,7 @@ def _as_tables(value: Any) -> Any:
     return [{name: _as_tables(getattr(row, name)) for name in row.telling} for row in value]
 
 
-def _plain_rows() -> tuple[Row, ...]:
+def _plain_rows() -> tuple[ParameterRow, ...]:
     """Rows of the keys that stand in a group itself, sections as one."""
     return tuple(row for row in parameter_table() if "*" not in row.key)
 

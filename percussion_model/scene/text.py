@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table, rows_by_key
-from percussion_model.scene.rows import Row, SceneError, shortened, toml_value
+from percussion_model.scene.rows import ParameterRow, SceneError, shortened, toml_value
 from percussion_model.scene.units import has_unit, with_point
 from percussion_model.scene.writing import write_whole
 
@@ -156,7 +156,7 @@ def commented_scene(
     return "\n".join(lines) + "\n"
 
 
-def _commented_value(row: Row, value: Any, hidden: bool) -> list[str]:
+def _commented_value(row: ParameterRow, value: Any, hidden: bool) -> list[str]:
     comment = f"# {row.description}: {row.allowed}"
     if hidden:
         comment += f"; needs {row.effect}"
@@ -165,7 +165,7 @@ def _commented_value(row: Row, value: Any, hidden: bool) -> list[str]:
     return [comment, f"{mark}{row.key.rpartition('.')[2]} = {shown}".rstrip()]
 
 
-def _commented_rods(row: Row, rods: Iterable[Any]) -> list[str]:
+def _commented_rods(row: ParameterRow, rods: Iterable[Any]) -> list[str]:
     lines = []
     for rod in rods:
         lines += ["", f"[[{row.key}]]"]
@@ -181,7 +181,7 @@ def _commented_rods(row: Row, rods: Iterable[Any]) -> list[str]:
 
 
 def _commented_sections(
-    row: Row, sections: Iterable[Any], hidden: bool, table: str = ""
+    row: ParameterRow, sections: Iterable[Any], hidden: bool, table: str = ""
 ) -> list[str]:
     mark = "# " if hidden else ""
     lines = []

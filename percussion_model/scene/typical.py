@@ -8,7 +8,7 @@ from typing import Any
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.group import Parameters
 from percussion_model.scene.parameters import find_row
-from percussion_model.scene.rows import Row, unit_suffix
+from percussion_model.scene.rows import ParameterRow, unit_suffix
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.units import QUANTITIES, factor
 
@@ -52,7 +52,7 @@ def hint_of(key: str, values: Iterable[float]) -> str:
     return ""
 
 
-def _meant(row: Row, value: float) -> str:
+def _meant(row: ParameterRow, value: float) -> str:
     """The same number with a unit that makes it a usual value; empty if there is none."""
     low, high = row.typical or (0.0, 0.0)
     for unit in QUANTITIES[row.unit].usual if row.unit in QUANTITIES else ():

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from percussion_model.scene.rows import (
     REFUSED,
-    Row,
+    ParameterRow,
     refuse_value,
     show_value,
     unit_suffix,
@@ -88,10 +88,10 @@ class NoQuantityError(UnitError):
     """A text that is no number with a unit."""
 
 
-def read_value(row: Row, value: Any) -> Any:
+def read_value(row: ParameterRow, value: Any) -> Any:
     """Return a value as a scene keeps it, `REFUSED` if it is not allowed.
 
-    As `Row.read`, which it goes beyond by numbers with their unit as text.
+    As `ParameterRow.read`, which it goes beyond by numbers with their unit as text.
     """
     found = row.read(value)
     if found is REFUSED and isinstance(value, str) and row.kind == "number":
@@ -102,7 +102,7 @@ def read_value(row: Row, value: Any) -> Any:
     return found
 
 
-def refuse(row: Row, key: str, value: Any) -> str:
+def refuse(row: ParameterRow, key: str, value: Any) -> str:
     """Say in one line that a value is not allowed, and what is."""
     if not (isinstance(value, str) and row.kind == "number"):
         return refuse_value(row, key, value)

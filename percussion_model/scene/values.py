@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from percussion_model.scene.parameters import parameter_table
-from percussion_model.scene.rows import Row
+from percussion_model.scene.rows import ParameterRow
 
 
-def _is_whole(row: Row) -> bool:
+def _is_whole(row: ParameterRow) -> bool:
     """Whether a parameter is a whole number in the record; one left out is NaN, no such."""
     return row.kind != "number" and (row.required or row.default is not None)
 

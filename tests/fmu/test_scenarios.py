@@ -24,7 +24,7 @@ from scenarios import (
     pneumatic_drive,
     pressure_loss,
 )
-from scenarios.harness import Instance, greatest_difference, ramp, read_signals, run
+from scenarios.harness import Instance, plot, ramp, run
 from scenarios.results import ScenarioError
 
 ROOT = Path(__file__).parents[2]
@@ -42,7 +42,7 @@ def at(found, name, time):
 
 
 def draws(module, found, folder):
-    path = module.draw(found, folder / f"{module.__name__}.png")
+    path = plot(folder / f"{module.__name__}.png", module.TITLE, found, module.PANELS)
     assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert path.stat().st_size > 20_000
 
@@ -154,18 +154,16 @@ def test_pneumatic_drive(hammer, fmus, tmp_path):
     assert 0.1 * full * blows < found["air_used"][-1] < 5.0 * full * blows
 
 
-def test_signals_come_from_functions_and_from_files(make, tmp_path):
+def test_a_signal_is_held_from_the_start_of_each_step(make):
     signal = ramp((0.0, 1000.0), (0.1, 3000.0))
-    table = tmp_path / "signals.csv"
-    rows = [f"{0.01 * k!r},{signal(0.01 * k)!r}" for k in range(20)]
-    table.write_text("\n".join(["time,feed_force", *rows]) + "\n")
-    read = read_signals(table)
-    assert read["feed_force"](0.015) == signal(0.01)
-    runs = []
-    for inputs in ({"feed_force": signal}, read):
-        instance = make(feed_force=1000.0)
-        runs.append(run(instance, 0.19, 0.01, inputs, ["bit.position", "blow_count"]))
-    assert max(greatest_difference(*runs).values()) == 0.0
+    assert (signal(-1.0), signal(0.05), signal(1.0)) == (1000.0, 2000.0, 3000.0)
+    found = run(make(feed_force=1000.0), 0.19, 0.01, {"feed_force": signal}, ["bit.position"])
+    other = make(feed_force=1000.0)
+    for k in range(19):
+        other.time = 0.01 * k
+        other.set({"feed_force": signal(other.time)})
+        other.step(0.01)
+    assert found["bit.position"][-1] == other.get("bit.position")
 
 
 @pytest.fixture
@@ -177,7 +175,7 @@ def scenario(monkeypatch, tmp_path, capsys):
         name = module.__name__.removeprefix("scenarios.")
         monkeypatch.setattr("sys.argv", ["scenario", *map(str, words)])
         with pytest.raises(SystemExit) as ended:
-            harness.command_line(name, module.simulate, module.draw)
+            harness.command_line(name, module.simulate, module.TITLE, module.PANELS)
         return ended.value.code, capsys.readouterr().err
 
     return call

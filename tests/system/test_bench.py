@@ -11,7 +11,7 @@ import pytest
 
 from percussion_model.coupling import CouplingError
 from percussion_model.coupling.bench import (
-    TRIALS,
+    STANDARD_RUNS,
     bench,
     judge,
     mean_points,
@@ -154,7 +154,7 @@ def made_up(feed, torque=100.0, error="", since=3.7):
 
 
 def test_points_are_what_they_are_said_to_be():
-    trial = TRIALS[0]
+    trial = STANDARD_RUNS[0]
     assert judge(trial, made_up(3000.0)).points == pytest.approx(100.0)
     assert judge(trial, made_up(2400.0)).points == pytest.approx(80.0)
     jammed = judge(trial, made_up(3000.0, torque=300.0))
@@ -184,13 +184,13 @@ def test_points_are_what_they_are_said_to_be():
     ],
 )
 def test_a_run_fails_for_a_reason(changes, faults):
-    score = judge(TRIALS[0], made_up(**changes))
+    score = judge(STANDARD_RUNS[0], made_up(**changes))
     assert score.faults == faults
     assert (score.points == 0.0) == bool(faults)
 
 
 def test_the_page_says_what_a_stranger_needs(tmp_path):
-    scores = [judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[3], made_up(2000.0))]
+    scores = [judge(STANDARD_RUNS[0], made_up(3000.0)), judge(STANDARD_RUNS[3], made_up(2000.0))]
     page = write_bench_page(scores, tmp_path, "<mine>").read_text("utf-8")
     assert "Controller bench: &lt;mine&gt;" in page
     assert "1 of 2 runs failed: void" in page
@@ -199,16 +199,16 @@ def test_the_page_says_what_a_stranger_needs(tmp_path):
         assert name in scores[0].numbers
         assert page.count(head) == 2
         assert text in page
-    assert TRIALS[0].text in page
+    assert STANDARD_RUNS[0].text in page
     assert (tmp_path / "void.png").stat().st_size > 15_000
 
 
 def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
     """Its figures too: they would belong to another run."""
-    scores = [judge(TRIALS[0], made_up(3000.0))]
+    scores = [judge(STANDARD_RUNS[0], made_up(3000.0))]
     write_bench_page(scores, tmp_path, "first")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    scores = [judge(TRIALS[0], made_up(2900.0)), judge(TRIALS[3], made_up(2000.0))]
+    scores = [judge(STANDARD_RUNS[0], made_up(2900.0)), judge(STANDARD_RUNS[3], made_up(2000.0))]
     del scores[1].run.columns["hammer.bit.position"]
     with pytest.raises(KeyError):
         write_bench_page(scores, tmp_path, "second")
@@ -217,7 +217,10 @@ def test_a_page_that_cannot_be_finished_leaves_the_old_one(tmp_path):
 
 def test_a_score_has_its_error_by_the_step():
     """Twice the change, as an error of first order has it, and no less than what no step sees."""
-    score, finer = judge(TRIALS[3], made_up(2900.0)), judge(TRIALS[3], made_up(2880.0))
+    score, finer = (
+        judge(STANDARD_RUNS[3], made_up(2900.0)),
+        judge(STANDARD_RUNS[3], made_up(2880.0)),
+    )
     found = with_step_error(score, finer)
     assert (found.points, found.numbers) == (score.points, score.numbers)
     assert found.points_error == pytest.approx(2.0 * 100.0 * 20.0 / 3000.0)
@@ -247,7 +250,7 @@ def test_an_error_is_no_less_than_what_a_blow_makes():
         one.columns["string.lifted"] = ((time > 0.0) & (time < end + 1e-6)).astype(float)
         one.columns["rock.in_void"] = one.columns["string.lifted"]
         one.columns["hammer.blow_count"] = np.floor(20.0 * time)
-    found = with_step_error(judge(TRIALS[3], run), judge(TRIALS[3], other))
+    found = with_step_error(judge(STANDARD_RUNS[3], run), judge(STANDARD_RUNS[3], other))
     times = found.numbers["time_off_bottom"], found.errors["time_off_bottom"]
     assert times[0] == pytest.approx(0.423, abs=6e-4)
     assert abs(times[0] - 0.3975) < times[1]
@@ -256,7 +259,7 @@ def test_an_error_is_no_less_than_what_a_blow_makes():
     assert found.errors["dry_blows"] == 1.0
     short = made_up(3000.0)
     short.columns["hammer.blow_count"] = np.floor(5.0 * short["time"])  # 20 blows
-    few = with_step_error(*(judge(TRIALS[0], short) for _ in range(2)))
+    few = with_step_error(*(judge(STANDARD_RUNS[0], short) for _ in range(2)))
     for name in ("depth", "energy_per_metre"):
         assert few.errors[name] == pytest.approx(few.numbers[name] / 20.0)
     assert (few.errors["time_off_bottom"], few.errors["dry_blows"]) == (0.0, 0.0)
@@ -276,7 +279,7 @@ def test_what_is_no_controller_is_told(feed_control, tmp_path, monkeypatch, caps
 
 
 def test_a_run_that_fails_with_one_step_alone_is_in_doubt():
-    good, bad = judge(TRIALS[0], made_up(3000.0)), judge(TRIALS[0], made_up(2000.0))
+    good, bad = judge(STANDARD_RUNS[0], made_up(3000.0)), judge(STANDARD_RUNS[0], made_up(2000.0))
     for score, finer, words in ((good, bad, "it fails: the feed is off"), (bad, good, "not fail")):
         found = with_step_error(score, finer)
         assert words in found.doubt
@@ -286,8 +289,8 @@ def test_a_run_that_fails_with_one_step_alone_is_in_doubt():
 
 def test_a_bench_runs_with_half_the_step_too(feed_control, tmp_path, monkeypatch, capsys):
     """Errors hold what a tenth of the step finds; without them that is said."""
-    rod = tuple(replace(one, duration=2.4) for one in TRIALS if one.name == "rod")
-    monkeypatch.setattr("percussion_model.coupling.bench.TRIALS", rod)
+    rod = tuple(replace(one, duration=2.4) for one in STANDARD_RUNS if one.name == "rod")
+    monkeypatch.setattr("percussion_model.coupling.bench.STANDARD_RUNS", rod)
     words = ["bench-controller", "--system", str(feed_control), "--trial", "rod",
              "--json", str(tmp_path / "numbers.json"), "--out", str(tmp_path / "out")]  # fmt: skip
     found = {}
@@ -314,7 +317,7 @@ def test_a_bench_runs_with_half_the_step_too(feed_control, tmp_path, monkeypatch
 
 def test_sensors_do_not_depend_on_the_step():
     """They have a clock of their own: half the step sees each sample twice."""
-    (trial,) = (one for one in TRIALS if one.name == "sensors")
+    (trial,) = (one for one in STANDARD_RUNS if one.name == "sensors")
     usual, half = trial.on_way(), trial.on_way()
     coarse = [usual("controller.feed_force", 1e-3 * k, float(k)) for k in range(100)]
     fine = [half("controller.feed_force", 5e-4 * k, float(k // 2)) for k in range(200)]
@@ -329,7 +332,7 @@ def test_an_unknown_run_is_named(feed_control, name):
 
 
 def test_sensors_are_late_and_noisy_with_a_seed():
-    (trial,) = (one for one in TRIALS if one.name == "sensors")
+    (trial,) = (one for one in STANDARD_RUNS if one.name == "sensors")
     ways = [trial.on_way(), trial.on_way()]
     values = [[way("controller.feed_force", 1e-3 * k, float(k)) for k in range(200)]
               for way in ways]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from percussion_model.analysis.fitting.curve import bilinear_force, slow_force
+from percussion_model.analysis.fitting.curve import slow_force
 from percussion_model.analysis.fitting.fit import RANGES, fit_rock
 from percussion_model.analysis.fitting.found import Estimate, Explained, Fit, Rival
 from percussion_model.analysis.fitting.measurements import (
@@ -27,7 +27,6 @@ __all__ = [
     "FitError",
     "Reading",
     "Rival",
-    "bilinear_force",
     "drop_test_signal",
     "fit_rock",
     "slow_force",

@@ -56,37 +56,6 @@ def slow_force(
     return SlowRock(scene).weigh(p, np.zeros(len(p)), int(np.argmax(p)) + 1, datum, peak)[0]
 
 
-def bilinear_force(
-    penetration: Any,
-    stiffness: float,
-    ratio: float,
-    datum: float = 0.0,
-    peak: float | None = None,
-) -> np.ndarray:
-    """Force of one slow loading and unloading by the bilinear law, as `slow_force`.
-
-    Parameters
-    ----------
-    penetration : array_like
-        In the order of time: rising, then falling [m].
-    stiffness : float
-        K_R [N/m].
-    ratio : float
-        gamma.
-    datum : float
-        Penetration at which the rock is touched [m].
-    peak : float, optional
-        Penetration at which unloading begins [m]; default the greatest.
-
-    Returns
-    -------
-    ndarray
-        [N].
-    """
-    rock = {"rock.loading_stiffness": stiffness, "rock.unloading_ratio": ratio}
-    return slow_force(penetration, Scene().replace(**rock), datum, peak)
-
-
 class SlowFit(NamedTuple):
     """Where a curve fits a rock best [m], the force that is shown there [N], and the unknown
     zero of the force by the width of its prior, with its variance for this rock."""

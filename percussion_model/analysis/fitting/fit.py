@@ -22,7 +22,6 @@ from percussion_model.analysis.fitting.found import (
     Explained,
     Fit,
     Rival,
-    SensorEstimate,
     Source,
 )
 from percussion_model.analysis.fitting.likelihood import (
@@ -186,11 +185,7 @@ def fit_rock(
         unknowns = sum(one.unknowns for one in whole.series if one.simulated)
         alike = _quantile(confidence, len(names) + unknowns)
         found = _explored(whole, minima, quantile, alike, counter)
-    sensors, mixed = sensors_of(whole, found.best, found.spread)
-    counter.begin("check with finer cells")
-    return _result(
-        whole, sources, found, confidence, quantile, counter.done, untold, sensors, mixed
-    )
+    return _result(whole, sources, found, confidence, quantile, counter, untold)
 
 
 def _quantile(confidence: float, free: int) -> float:
@@ -336,12 +331,13 @@ def _result(
     explored: Explored,
     confidence: float,
     quantile: float,
-    runs: int,
+    counter: Counter,
     untold: Sequence[str],
-    sensors: Sequence[tuple[SensorEstimate, ...]],
-    mixed: Mapping[str, str],
 ) -> Fit:
     """Put a fit together."""
+    sensors, mixed = sensors_of(like, explored.best, explored.spread)
+    runs = counter.done
+    counter.begin("check with finer cells")
     best, spread, profiles, minima, threshold, settled, notes, unreached = explored
     estimates, curves = {}, {}
     for k, (name, found) in enumerate(zip(like.names, profiles, strict=True)):

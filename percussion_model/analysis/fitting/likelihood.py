@@ -49,6 +49,11 @@ def values_at(name: str, at: Any) -> Any:
     return at if name in EXPONENTS else np.exp(at)
 
 
+def with_unit(scene: Scene, name: str, text: str) -> str:
+    """A value of a parameter with its unit."""
+    return f"{text} {scene.row_of(name).unit.replace('-', '')}".rstrip()
+
+
 def decades(name: str, low: float, high: float) -> float:
     """How far two values are apart, in powers of ten of what they do to a force."""
     return high - low if name in EXPONENTS else math.log10(high / low)
@@ -152,10 +157,14 @@ class Likelihood:
         self._known: OrderedDict[bytes, Place] = OrderedDict()
         self._least = [math.inf] * len(series)  # deviance of each that was seen
 
+    @property
+    def box(self) -> np.ndarray:
+        """Coordinates between which each parameter lies."""
+        return np.stack([self.low, self.high], axis=1)
+
     def with_series(self, series: Sequence[Series]) -> Likelihood:
         """That of other measurements, with the same parameters."""
-        ranges = np.stack([self.low, self.high], axis=1)
-        return Likelihood(self.scene, series, self.names, ranges, self._tick)
+        return Likelihood(self.scene, series, self.names, self.box, self._tick)
 
     def at(self, at: np.ndarray) -> Place:
         """Compute the place of parameters (coordinates), within their ranges."""

@@ -26,9 +26,10 @@ from percussion_model.analysis.fitting.likelihood import (
     Place,
     decades,
     values_at,
+    with_unit,
 )
 from percussion_model.analysis.fitting.sampling import Profile
-from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
+from percussion_model.analysis.fitting.search import steps_of
 from percussion_model.analysis.fitting.trust import neighbours
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.solvers.base import make_solver
@@ -50,8 +51,7 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
     """Say which parameters the data do not tell, or only roughly."""
     notes = []
     for name, one in estimates.items():
-        unit = like.scene.row_of(name).unit.replace("-", "")
-        low, high = (f"{end} {unit}".rstrip() for end in one.texts()[1:])
+        low, high = (with_unit(like.scene, name, end) for end in one.texts()[1:])
         apart = decades(name, one.low, one.high)
         if name in EXPONENTS:
             width, roughly = f"a range of {in_digits(apart, 2)}", f"within {in_digits(apart, 2)}"
@@ -103,11 +103,9 @@ def kept_notes(like: Likelihood, slow: bool, untold: Sequence[str] = ()) -> list
 
 def _values_of(like: Likelihood, keys: Sequence[str]) -> str:
     """What the scene has of some parameters."""
-    shown = []
-    for key in keys:
-        unit = like.scene.row_of(key).unit.replace("-", "")
-        shown.append(f"{NAMES[key]} = {like.scene[key]:.4g} {unit}".rstrip())
-    return ", ".join(shown)
+    return ", ".join(
+        with_unit(like.scene, key, f"{NAMES[key]} = {like.scene[key]:.4g}") for key in keys
+    )
 
 
 def rough_notes(rough: float) -> list[str]:
@@ -126,9 +124,8 @@ def gap_notes(like: Likelihood, profiles: Sequence[Profile]) -> list[str]:
     notes = []
     for name, one in zip(like.names, profiles, strict=True):
         if one.gap is not None:
-            unit = like.scene.row_of(name).unit.replace("-", "")
-            ends = (values_at(name, end) for end in one.gap)
-            low, high = (f"{in_digits(end)} {unit}".rstrip() for end in ends)
+            ends = (in_digits(values_at(name, end)) for end in one.gap)
+            low, high = (with_unit(like.scene, name, end) for end in ends)
             notes.append(
                 f"{NAMES[name]} ({name}) lies below {low} or above {high}: "
                 "what lies between explains the data less well"
@@ -140,16 +137,11 @@ def rival_notes(rivals: Sequence[Rival]) -> list[str]:
     """Say which other rocks explain the data nearly as well."""
     notes = []
     for one in rivals:
-        values = ", ".join(
-            f"{NAMES[key]} = {in_digits(value)}" for key, value in one.values.items()
-        )
-        notes.append(f"another minimum, {_odds(one)}: {values}")
+        values = (f"{NAMES[key]} = {in_digits(value)}" for key, value in one.values.items())
+        less = 1.0 / one.odds
+        odds = "as likely" if less < 1.5 else f"{in_digits(less, 2)} times less likely"
+        notes.append(f"another minimum, {odds}: {', '.join(values)}")
     return notes
-
-
-def _odds(rival: Rival) -> str:
-    less = 1.0 / rival.odds
-    return "as likely" if less < 1.5 else f"{in_digits(less, 2)} times less likely"
 
 
 def correlation_note(one: Explained) -> list[str]:
@@ -177,13 +169,13 @@ def grid_notes(
         scene.replace(**{key: 2 * cells[0], "solver.accuracy": None}),
         like.series,
         like.names,
-        np.stack([like.low, like.high], axis=1),
+        like.box,
         lambda: None,
     )
     weights = like.weights(best.noise)
     off = np.concatenate(best.residuals)
     change = (np.concatenate(finer.at(best.at).residuals) - off) * weights
-    steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
+    steps = steps_of(spread)
     columns = [
         (np.concatenate(like.at(best.at + row).residuals) - off) * weights / step
         for row, step in zip(np.diag(steps), steps, strict=True)

@@ -70,10 +70,15 @@ def descend(
     for _ in range(rounds):
         begun = best
         best, spread = _one_round(like, begun, free, size[free])
-        size[free] = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
+        size[free] = steps_of(spread)
         if begun.deviance - best.deviance < ARRIVED:
             break
     return best, spread
+
+
+def steps_of(spread: np.ndarray) -> np.ndarray:
+    """Steps of slopes, by the covariance of the parameters."""
+    return np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
 
 
 def _one_round(

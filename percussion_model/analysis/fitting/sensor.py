@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,16 +64,6 @@ class Tried(NamedTuple):
     between: np.ndarray
     data: np.ndarray
     base: np.ndarray
-
-
-class Sensor(Protocol):
-    """A sensor with unknowns."""
-
-    unknowns: tuple[Unknown, ...]
-
-    def sensed(self, scene: Scene) -> Sensed:
-        """What it shows of a rock where its unknowns are likeliest."""
-        ...
 
 
 class DropSensor:
@@ -248,3 +238,6 @@ class CurveSensor:
         found = best_datum_and_peak(self._curve, scene, self._guess)
         count = len(self.unknowns)
         return Sensed(found.force, np.full(count, found.pull), found.variance * np.eye(count))
+
+
+Sensor = DropSensor | CurveSensor

@@ -58,6 +58,16 @@ class Response:
                 found.append(float(brentq(lambda at: self(at) - level, a, b, xtol=EXACT)))
         return sorted(found)
 
+    def roots(self) -> list[float]:
+        """Where the model gives the number."""
+        return [at for at in self.crossings(0.0) if abs(self(at)) < MET]
+
+    def within(self, limit: float) -> list[float]:
+        """Known places that give it within so many errors, both ends of them included."""
+        for level in (-limit, limit):
+            self.crossings(level)
+        return [at for at in self.met if abs(self(at)) <= limit]
+
     def nearest(self) -> None:
         """Seek the place that comes nearest, beside the best so far."""
         from scipy.optimize import minimize_scalar
@@ -86,7 +96,7 @@ def solved(like: Likelihood, reading: Reading, threshold: float) -> Explored:
     low, high = float(like.low[0]), float(like.high[0])
     for at in np.linspace(low, high, PLACES):
         response(float(at))
-    roots = [at for at in response.crossings(0.0) if abs(response(at)) < MET]
+    roots = response.roots()
     if not roots:
         response.nearest()
     best = min(response.met.values(), key=lambda one: one.deviance)
@@ -94,17 +104,14 @@ def solved(like: Likelihood, reading: Reading, threshold: float) -> Explored:
     if own > 0.0:
         response.error = math.hypot(response.error, own)
     limit = math.sqrt(threshold)
-    for level in (-limit, limit):
-        response.crossings(level)
-    near = [at for at in response.met if abs(response(at)) <= limit]
+    near = response.within(limit)
     if near:
         # the response may rise and fall within the errors, and beside them
         width = max(max(near) - min(near), EXACT)
         for at in np.linspace(min(near) - width, max(near) + width, FINER):
             response(float(np.clip(at, low, high)))
-        for level in (-limit, limit):
-            response.crossings(level)
-        roots = [at for at in response.crossings(0.0) if abs(response(at)) < MET]
+        response.within(limit)
+        roots = response.roots()
         best = min(response.met.values(), key=lambda one: one.deviance)
     at = np.array(sorted(response.met))
     above = np.array([response(one) ** 2 for one in at])

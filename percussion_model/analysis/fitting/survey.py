@@ -92,6 +92,11 @@ def seen(sight: Sight, names: Sequence[str], like: Likelihood) -> np.ndarray:
     return np.clip(at, like.low[kept], like.high[kept])
 
 
+def _sizes(like: Likelihood) -> np.ndarray:
+    """How far the first finer grid goes to each side, of each parameter."""
+    return np.array([ZOOM[name] for name in like.names])
+
+
 class Counter:
     """Computations done and stages that begin, passed on."""
 
@@ -118,16 +123,10 @@ def minima_of(
     whole: Likelihood, sources: Sequence[Source], sight: Sight | None, counter: Counter
 ) -> list[Place]:
     """Find minima that may be the best, the deepest first."""
-    thin = Likelihood(
-        whole.scene,
-        series_of(sources, sight, SEARCH_SAMPLES),
-        whole.names,
-        np.stack([whole.low, whole.high], axis=1),
-        counter.tick,
-    )
+    thin = whole.with_series(series_of(sources, sight, SEARCH_SAMPLES))
     simple = all(isinstance(one, Curve) for one in sources)
     every = range(len(whole.names))
-    sizes = np.array([ZOOM[name] for name in whole.names])
+    sizes = _sizes(whole)
     most = 0 if lengthens(whole.names, sources) else _most_surveyed(whole.names, sources)
     counter.begin("search of the whole range", most)
     found = _searched(thin, sources, sight, counter)
@@ -183,7 +182,7 @@ def _searched(
     thin: Likelihood, sources: Sequence[Source], sight: Sight | None, counter: Counter
 ) -> list[Place]:
     """Minima of few samples, the best first."""
-    sizes = np.array([ZOOM[name] for name in thin.names])
+    sizes = _sizes(thin)
     starts = distinct(_survey(thin, sources, sight), ZOOMS[-1] * sizes, STARTS)
     counter.begin("descent from the best places")
     every = range(len(thin.names))
@@ -197,29 +196,21 @@ def _survey(thin: Likelihood, sources: Sequence[Source], sight: Sight | None) ->
     guess = coordinates(
         names, [thin.scene[name] or (0.0 if name in EXPONENTS else 1.0) for name in names]
     )
-    box = np.stack([thin.low, thin.high], axis=1)
+    box = thin.box
     slow = [k for k, name in enumerate(names) if name in SLOW]
     rough = [k for k in range(len(names)) if k not in slow]
     curves = [one for one in sources if isinstance(one, Curve)]
     steps = np.zeros(len(names))
     steps[slow] = SLOW_STEP
     places = [thin.at(guess)]
-    axes = {k: np.linspace(box[k, 0], box[k, 1], VALUES[names[k]]) for k in rough}
     if slow and sight is not None:
         guess[slow] = seen(sight, [names[k] for k in slow], thin)
         alone = Likelihood(thin.scene, series_of(curves, sight), names, box, lambda: None)
         place, spread = descend(alone, np.clip(guess, thin.low, thin.high), slow)
-        places = [thin.at(place.at)]
+        places, starts = [thin.at(place.at)], [place.at]
         if len(sources) == len(curves):
             return places
         steps[slow] = np.minimum(CURVE_ERRORS * np.sqrt(np.diag(spread)), MOST_CURVE_STEP)
-        if lengthens(names, sources):
-            longest, steps = _lengthened(thin, sources, sight, [place.at], steps)
-            places += [thin.at(at) for at in longest]
-            place = min(places, key=lambda one: one.deviance)
-        if not rough:
-            return places
-        places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
     else:
         for k in slow:
             if names[k] not in EXPONENTS:
@@ -227,17 +218,20 @@ def _survey(thin: Likelihood, sources: Sequence[Source], sight: Sight | None) ->
         rows = design(box, _points(names), names.index(ENERGY) if ENERGY in names else -1, LEVELS)
         if lengthens(names, sources):
             first = _shortened(thin, sources, sight, SHARES[0])
-            sizes = np.array([ZOOM[name] for name in names])
-            best = distinct([first.at(at) for at in rows], sizes, STARTS)
-            longest, steps = _lengthened(thin, sources, sight, [one.at for one in best], steps)
-            places += [thin.at(at) for at in longest]
-            place = min(places, key=lambda one: one.deviance)
-            if rough:
-                places += [thin.at(at) for at in grid(thin, place.at, axes, slow, steps)[:RELAXED]]
+            best = distinct([first.at(at) for at in rows], _sizes(thin), STARTS)
+            starts = [one.at for one in best]
         else:
             places += [thin.at(at) for at in rows]
+            starts = []
+    if lengthens(names, sources):
+        longest, steps = _lengthened(thin, sources, sight, starts, steps)
+        places += [thin.at(at) for at in longest]
+    if starts and rough:
+        axes = {k: np.linspace(thin.low[k], thin.high[k], VALUES[names[k]]) for k in rough}
+        base = min(places, key=lambda one: one.deviance).at
+        places += [thin.at(at) for at in grid(thin, base, axes, slow, steps)[:RELAXED]]
     for share in ZOOMS:
-        sizes = share * np.array([ZOOM[name] for name in names])
+        sizes = share * _sizes(thin)
         for centre in distinct(places, sizes, ZOOMED):
             places += _zoom(thin, centre.at, sizes, share * steps)
     return places
@@ -279,7 +273,7 @@ def _lengthened(
         for k, name in enumerate(names)
         if name in ZOOM_VALUES
     }
-    sizes = ZOOMS[-1] * np.array([ZOOM[name] for name in names])
+    sizes = ZOOMS[-1] * _sizes(thin)
     carried = list(starts)
     for share in SHARES:
         like = _shortened(thin, sources, sight, share)

@@ -16,7 +16,7 @@ from percussion_model.analysis.fitting.found import (
 )
 from percussion_model.analysis.fitting.likelihood import Likelihood, Place
 from percussion_model.analysis.fitting.measurements import Reading, is_rounding
-from percussion_model.analysis.fitting.search import LEAST_STEP, MOST_STEP, STEP_SHARE
+from percussion_model.analysis.fitting.search import steps_of
 from percussion_model.analysis.fitting.sensor import DELAY, REACH
 from percussion_model.simulation.uncertain import in_digits
 
@@ -63,7 +63,7 @@ def sensors_of(
     spread : ndarray
         Covariance of the parameters there.
     """
-    steps = np.clip(STEP_SHARE * np.sqrt(np.diag(spread)), LEAST_STEP, MOST_STEP)
+    steps = steps_of(spread)
     steps = np.where(best.at + steps > like.high, -steps, steps)
     beside = [like.at(best.at + row) for row in np.diag(steps)]
     found: list[tuple[SensorEstimate, ...]] = []

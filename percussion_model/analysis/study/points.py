@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.scene.parameters import find_row, read_number
-from percussion_model.scene.rows import Row, shortened, toml_value
+from percussion_model.scene.rows import ParameterRow, shortened, toml_value
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.scene.units import with_point
 
@@ -182,7 +182,7 @@ def read_axis(text: str) -> tuple[str, np.ndarray]:
         ) from None
 
 
-def _refuse_no_number(row: Row, key: str) -> None:
+def _refuse_no_number(row: ParameterRow, key: str) -> None:
     """Raise `SceneError` for what is no number."""
     if row.kind in ("number", "whole number"):
         return

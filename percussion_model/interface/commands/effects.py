@@ -20,7 +20,7 @@ from percussion_model.simulation.uncertain import (
 )
 
 if TYPE_CHECKING:
-    from percussion_model.analysis.effect_study import EffectsStudy, Trial
+    from percussion_model.analysis.effect_study import EffectsStudy, VariantRun
 
 
 def effects(
@@ -90,7 +90,7 @@ NOTE_OF_FALL = (
 )
 
 # Columns: heading, and what stands in it.
-Columns = dict[str, Callable[["EffectsStudy", "Trial", dict[str, Any]], str]]
+Columns = dict[str, Callable[["EffectsStudy", "VariantRun", dict[str, Any]], str]]
 _COSTS: Columns = {
     "step\nns": lambda study, trial, row: (
         _number(row["step_time"], 1e9, 3) + DEARER * study.is_costlier(trial)
@@ -203,5 +203,5 @@ def _number(value: float | None, factor: float, digits: int) -> str:
     return "-" if value is None else f"{float(f'{factor * value:.{digits}g}'):g}"
 
 
-def _change(found: EffectsStudy, trial: Trial, name: str) -> str:
+def _change(found: EffectsStudy, trial: VariantRun, name: str) -> str:
     return "" if trial is found.base else found.change(trial, name).text()

@@ -13,7 +13,7 @@ from bokeh.layouts import row as side_by_side
 from bokeh.models import Checkbox, Div, LayoutDOM, Select, Slider, TextInput
 
 from percussion_model.scene.parameters import GROUPS, find_row
-from percussion_model.scene.rows import Row, SceneError, shortened
+from percussion_model.scene.rows import ParameterRow, SceneError, shortened
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_setting
 
@@ -55,7 +55,7 @@ WIDGETS = """
 Change = Callable[[str, Any], str]
 
 
-def label_of(row: Row, key: str) -> str:
+def label_of(row: ParameterRow, key: str) -> str:
     """Name of a number with its unit: where it is in a bar, and what the table says of it."""
     parts = key.split(".")
     place = f"{parts[0]}, section {int(parts[2]) + 1}: " if len(parts) > 2 else ""
