@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from percussion_model.analysis.drill_string import Extreme
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
+from percussion_model.interface.pages import filled
 from percussion_model.interface.plotting import CAPTIONS, figures, watched_string
 from percussion_model.interface.plotting.window import (
     StressField,
@@ -418,14 +418,8 @@ def _write_page(folder: Path, page: str) -> Path:
 
 def _render(template: str, scene: Scene, changed: dict[str, Any], **values: Any) -> str:
     """Fill a template that shows a scene, with parameters that the run replaced."""
-    environment = Environment(
-        loader=PackageLoader("percussion_model.interface", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    return environment.get_template(template).render(
+    return filled(
+        template,
         title=scene.title or "Percussive drilling",
         parameters=_parameter_rows(scene, changed),
         effects_on=scene.effects_on,
