@@ -89,8 +89,7 @@ def _edges(contacts: list[tuple[float, float]]) -> list[tuple[str, float]]:
 
 
 def _letter_edges(ax: Axes, contacts: list[tuple[float, float]]) -> None:
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.14 * (high - low))
+    style.room_above(ax, 0.14)
     for k, (letter, time) in enumerate(_edges(contacts)):
         ax.annotate(
             letter,
