@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -170,8 +170,8 @@ def command_line(repeats: int) -> dict[str, Any]:
 def show(found: dict[str, Any]) -> None:
     """Print the figures as tables."""
     from rich.console import Console
-    from rich.table import Table
 
+    from percussion_model.interface.tables import named_table, print_table
     from percussion_model.simulation.uncertain import rate_text
 
     console = Console()
@@ -183,19 +183,9 @@ def show(found: dict[str, Any]) -> None:
     if (computer["load_before"] or 0.0) > 0.5:
         console.print(f"[yellow]The machine was busy: load {computer['load_before']:.1f}.[/yellow]")
 
-    table = Table(title="Reference scene: simulated time by time to compute", title_justify="left")
-    for heading in (
-        "solver",
-        "cells",
-        "leaps",
-        "times real time",
-        "range",
-        "rate mm/s",
-        "period ms",
-    ):
-        table.add_column(heading, justify="right")
-    for row in found["reference"]:
-        table.add_row(
+    headings = ("solver", "cells", "leaps", "times real time", "range", "rate mm/s", "period ms")
+    rows = [
+        (
             row["solver"],
             f"{row['cells']}",
             "on" if row["leaps"] else "off",
@@ -204,35 +194,42 @@ def show(found: dict[str, Any]) -> None:
             rate_text(row),
             f"{1e3 * row['blow_period']:.4f}",
         )
-    console.print(table)
-
-    table = Table(title="A wave step, 20 cells, without leaps", title_justify="left")
-    table.add_column("scene")
-    for heading in ("in flight ns", "in motion ns", "0.25 s in ms", "steps", "events"):
-        table.add_column(heading, justify="right")
-    for row in found["effects"]:
-        mark = " [red]dearer[/red]" if row["dearer"] else ""
-        table.add_row(
-            row["name"] + mark,
+        for row in found["reference"]
+    ]
+    show_table("Reference scene: simulated time by time to compute", headings, rows)
+    headings = ("scene", "in flight ns", "in motion ns", "0.25 s in ms", "steps", "events")
+    rows = [
+        (
+            row["name"] + (" [red]dearer[/red]" if row["dearer"] else ""),
             f"{1e9 * row['flight_step']:.0f}",
             f"{1e9 * row['motion_step']:.0f}",
             f"{1e3 * row['motion_cost']:.1f}",
             f"{row['motion_steps']}",
             f"{row['motion_events']}",
         )
-    console.print(table)
-
-    table = Table(show_header=False)
-    table.add_row("Rigid option, a blow", f"{1e6 * found['rigid']['blow']:.2f} µs")
-    fem = found["elements"]
+        for row in found["effects"]
+    ]
+    show_table("A wave step, 20 cells, without leaps", headings, rows)
+    fem, start = found["elements"], found["command_line"]
     shown = f"{fem['real_time_factor']:.2f} times real time, {1e6 * fem['step']:.2f} µs a step"
-    table.add_row("Finite elements", shown)
-    for label, figure in fmu_rows(found["fmu"]):
-        table.add_row(label, figure)
-    start = found["command_line"]
-    table.add_row("Command line, 0.1 s simulated: first start", f"{start['first']:.2f} s")
-    table.add_row("Command line, 0.1 s simulated: later starts", f"{start['second']:.2f} s")
-    console.print(table)
+    rows = [
+        ("Rigid option, a blow", f"{1e6 * found['rigid']['blow']:.2f} µs"),
+        ("Finite elements", shown),
+        *fmu_rows(found["fmu"]),
+        ("Command line, 0.1 s simulated: first start", f"{start['first']:.2f} s"),
+        ("Command line, 0.1 s simulated: later starts", f"{start['second']:.2f} s"),
+    ]
+    print_table(named_table(rows))
+
+
+def show_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table, its first column of names."""
+    from percussion_model.interface.tables import airy_table, print_table
+
+    table = airy_table(headings, headings[:1], title=title, title_justify="left")
+    for row in rows:
+        table.add_row(*row)
+    print_table(table)
 
 
 def compiled_in() -> float:

@@ -111,18 +111,26 @@ def host(path: Path, count: int, cache: str) -> dict[str, float]:
     return found
 
 
+def read_rows(of: str, found: dict[str, Any], digits: int) -> list[tuple[str, str]]:
+    """Speed by what is read after each step, as lines of a table."""
+    read = {"none": "no output", "few": f"{len(A_FEW)} outputs", "all": "all outputs"}
+    return [
+        (
+            f"{of}: steps of 1 ms, {text} read at each",
+            f"{found[name]:.{digits}f} × real time",
+        )
+        for name, text in read.items()
+    ]
+
+
 def rows(found: dict[str, Any]) -> list[tuple[str, str]]:
     """Figures as lines of a table."""
-    read = {"none": "no output", "few": f"{len(A_FEW)} outputs", "all": "all outputs"}
     return [
         ("FMU: first instance ever, kernels compiled", f"{found['cold']:.1f} s"),
         ("FMU: first instance in a process", f"{found['warm']:.2f} s"),
         ("FMU: next instance", f"{1e3 * found['again']:.1f} ms"),
         ("FMU: a doStep of 1 ms beyond the physics", f"{1e6 * found['step']:.1f} µs"),
         ("FMU: a doStep of 1 µs", f"{1e6 * found['short_step']:.1f} µs"),
-        *(
-            (f"FMU: steps of 1 ms, {text} read at each", f"{found[name]:.1f} × real time")
-            for name, text in read.items()
-        ),
+        *read_rows("FMU", found, 1),
         ("The same in the library, one call", f"{found['physics']:.1f} × real time"),
     ]

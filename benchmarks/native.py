@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from benchmarks.fmu import A_FEW, COUNT, STEP, host
+from benchmarks.fmu import COUNT, STEP, host, read_rows
 
 HOST = Path(__file__).with_name("native_steps.c")
 
@@ -82,7 +82,6 @@ def rows(found: dict[str, Any]) -> list[tuple[str, str]]:
     def dear(name: str) -> str:
         return ", ".join(f"{1e-3 * took:.1f} µs to {end:.4f} s" for end, took in found[name])
 
-    read = {"none": "no output", "few": f"{len(A_FEW)} outputs", "all": "all outputs"}
     return [
         ("C: a doStep in which nothing happens", f"{found['empty']:.0f} ns"),
         ("C: the same, and all Real outputs read", f"{found['empty_read']:.0f} ns"),
@@ -92,10 +91,7 @@ def rows(found: dict[str, Any]) -> list[tuple[str, str]]:
         ("C: with all Real outputs read, first run", spread("read_first")),
         ("C: the same, least of the runs", spread("read_least")),
         ("C: the dearest of these", dear("read_worst")),
-        *(
-            (f"fmpy: steps of 1 ms, {text} read at each", f"{found[name]:.0f} × real time")
-            for name, text in read.items()
-        ),
+        *read_rows("fmpy", found, 0),
     ]
 
 

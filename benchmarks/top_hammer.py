@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from typing import Any
 
 from percussion_model import Scene, Simulation
 from percussion_model.scene.hammers import hammer
@@ -32,16 +31,17 @@ def cost(scene: Scene, simulated: float = SIMULATED) -> float:
     return (time.process_time() - began) / simulated
 
 
-def speeds() -> None:
-    """How many times faster than real time the presets run."""
-    scenes = {name: hammer(name, 4) for name in TOP_HAMMERS}
+def costs(scenes: dict[str, Scene]) -> dict[str, list[float]]:
+    """Costs of repeated runs, in turn."""
     for scene in scenes.values():
         cost(scene, 0.05)
-    taken: dict[str, list[float]] = {name: [] for name in scenes}
-    for _ in range(REPETITIONS):
-        for name, scene in scenes.items():
-            taken[name].append(cost(scene))
-    for name, times in taken.items():
+    rounds = [{name: cost(scene) for name, scene in scenes.items()} for _ in range(REPETITIONS)]
+    return {name: [one[name] for one in rounds] for name in scenes}
+
+
+def speeds() -> None:
+    """How many times faster than real time the presets run."""
+    for name, times in costs({name: hammer(name, 4) for name in TOP_HAMMERS}).items():
         ratios = sorted(1.0 / one for one in times)
         print(f"{name}, four rods: {statistics.median(ratios):.1f} times real time "
               f"({ratios[0]:.1f} to {ratios[-1]:.1f})")  # fmt: skip
@@ -49,29 +49,20 @@ def speeds() -> None:
 
 def long_rods() -> None:
     """What thirty metres of rod cost beside three, and ten joined rods of three metres."""
-    plain: dict[str, Any] = {"effects": {"damper": False}}
-    base = hammer("t38", 1)
-    tree = base.given_values()
+    tree = hammer("t38", 1).given_values()
     body = {"area": 1029e-6, "youngs_modulus": 206e9}
     shank, rod = tree["string"]["rods"]
 
     def scene(*lengths: float) -> Scene:
         rods = [shank, *({**rod, "sections": [{**body, "length": one}]} for one in lengths)]
-        cells = {"solver": {"cells": 20}}
-        groups = {**tree, **cells, "string": {"rods": rods}}
-        groups["effects"] = {**tree["effects"], **plain["effects"]}
-        return Scene(**groups)
+        effects = tree["effects"] | {"damper": False}
+        changes = {"solver": {"cells": 20}, "string": {"rods": rods}, "effects": effects}
+        return Scene(**tree | changes)
 
     scenes = {
         "3 m": scene(3.0), "30 m in one": scene(30.0), "30 m in ten": scene(*[3.0] * 10),
     }  # fmt: skip
-    for one in scenes.values():
-        cost(one, 0.05)
-    taken: dict[str, list[float]] = {name: [] for name in scenes}
-    for _ in range(REPETITIONS):
-        for name, one in scenes.items():
-            taken[name].append(cost(one))
-    medians = {name: statistics.median(times) for name, times in taken.items()}
+    medians = {name: statistics.median(times) for name, times in costs(scenes).items()}
     for name, median in medians.items():
         print(f"{name}: {1e3 * median:.1f} ms a simulated second, "
               f"{median / medians['3 m']:.2f} times that of 3 m")  # fmt: skip

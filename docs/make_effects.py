@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
 from docs.blocks import renewed, table
 from percussion_model import Scene
 from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
-from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.effect_bars import draw_effects
+from percussion_model.interface.plotting.style import save_figures
 from percussion_model.verification.accuracy.timing import machine
 
 HERE = Path(__file__).resolve().parent
@@ -42,8 +40,7 @@ def main() -> None:
     found = study_effects(Scene.from_toml(REFERENCE))
     text = renewed(PAGE, {"effects": block(found, computer)})
     PAGE.write_text(text, encoding="utf-8")
-    with matplotlib.rc_context(style.STYLE):
-        draw_effects(found).savefig(HERE / "images" / "effects.png", dpi=110)
+    save_figures(lambda: [("effects", draw_effects(found))], HERE / "images", ("png",), dpi=110)
 
 
 if __name__ == "__main__":

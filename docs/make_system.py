@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from docs.blocks import renewed, table
+from docs.drawings.system import SYSTEM, connected
 from fmu_src.parts.build import PARTS, part_variables
-from fmu_src.system.archive import SYSTEMS, read_plan
+from fmu_src.system.archive import read_plan
 from fmu_src.variables import Variable
 
 PAGE = Path(__file__).with_name("system.md")
 VARIABLES = Path(__file__).parent / "data" / "system_variables.md"
 HEADINGS = ("name", "kind", "unit", "start", "range", "meaning")
-SYSTEM = SYSTEMS / "feed_control.toml"
 HEAD = """# Variables of the drilling system
 
 This page lists every input, output and parameter of the parts of a [drilling
@@ -29,11 +29,8 @@ page from the tables of the parts.
 
 def signals() -> str:
     """Table of the signals of the feed-controlled system, Markdown."""
-    plan = read_plan(SYSTEM)
-    variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
     rows = []
-    for sink, source in plan.connections.items():
-        one = _find(plan.components, variables, source) or _find(plan.components, variables, sink)
+    for source, sink, one in connected(read_plan(SYSTEM)):
         unit = (one.unit or "") if one else ""
         rows.append((f"`{source}`", f"`{sink}`", unit, one.description if one else ""))
     return table(("from", "to", "unit", "meaning"), rows)
@@ -46,13 +43,6 @@ def variables_page() -> str:
         rows = [_cells(one) for one in part_variables(part) if not _repeated(one.name)]
         lines.append(f"\n## {name}\n\n{table(HEADINGS, rows)}")
     return "\n".join(lines) + "\n"
-
-
-def _find(
-    components: dict[str, str], variables: dict[str, dict[str, Variable]], signal: str
-) -> Variable | None:
-    component, _, name = signal.partition(".")
-    return variables.get(components[component], {}).get(name)
 
 
 def _repeated(name: str) -> bool:

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 from matplotlib.figure import Figure
 
 from docs.blocks import renewed, table
@@ -33,7 +32,6 @@ SETTLE = 1.0
 LONG, SHORT, SHORTEST = 41.0, 5.0, 4.0  # [s]
 # Rates of two resolutions that differ by more count as different, if not by chance.
 SAME = 0.01
-SURE = 2.0  # standard errors
 # The loss axis is linear up to here [s].
 LINEAR = 1e-10
 
@@ -135,8 +133,7 @@ def main() -> None:
     for row in rates():
         rows.append(row)
         print({name: row[name] for name in ("loss", "cells", "rate", "error")}, file=sys.stderr)
-    with matplotlib.rc_context(style.STYLE):
-        draw(rows).savefig(HERE / "images" / "undamped.png", metadata={"Software": None}, dpi=110)
+    style.save_figures(lambda: [("undamped", draw(rows))], HERE / "images", ("png",), dpi=110)
     page = HERE / "data" / "undamped.md"
     write_text(page, renewed(page, {"rates": block(rows)}))
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
 from docs.blocks import renewed, table
 from percussion_model import Result, simulate
 from percussion_model.analysis.drill_string import StringReport, string_report
-from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.drill_string import bar_title, draw_string
+from percussion_model.interface.plotting.style import save_figures
 from percussion_model.scene.hammers import hammer, hammers
 from percussion_model.scene.text import write_text
 
@@ -151,10 +149,12 @@ def at_the_rock(report: StringReport) -> str:
 def main() -> None:
     """Make the figures and the tables."""
     report = string_report(hammer(SHOWN, SHOWN_RODS), DURATION, SETTLE, GAUGES)
-    with matplotlib.rc_context(style.STYLE):
-        for name, fig in draw_string(report):
-            path = HERE / "images" / f"top_hammer_{name.removeprefix('string_')}.png"
-            fig.savefig(path, metadata={"Software": None}, dpi=DPI)
+    save_figures(
+        lambda: (
+            (name.replace("string", "top_hammer"), fig) for name, fig in draw_string(report)
+        ),
+        HERE / "images", ("png",), dpi=DPI,
+    )  # fmt: skip
     contents = {
         "rock": at_the_rock(report),
         "joints": joints(report),

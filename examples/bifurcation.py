@@ -18,7 +18,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from examples.motions import ABOUT_ERRORS, KINDS, Branch, branch_of, described, kind_of
-from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of
+from examples.shared import BLUE, ORANGE, PINK, command_line, figure_of, plain_ticks
 from percussion_model import Scene, Simulation
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
@@ -103,7 +103,6 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
 def draw(axes: np.ndarray, factor: float, words: str, branches: dict[str, list[Branch]]) -> None:
     """Draw a column: the order of the blows, each blow, and the rate."""
     strip, blows, rate = axes
-    x = branches["falling"][0].values * factor
     _draw_kinds(strip, factor, branches)
     for way, some in branches.items():
         markers = {"color": COLOURS[way], "markersize": SIZES[way]}
@@ -112,10 +111,7 @@ def draw(axes: np.ndarray, factor: float, words: str, branches: dict[str, list[B
             blows.plot(at, branch.impact_velocity.ravel(), "o", mew=0, **markers)
             known = np.where(branch.error < MOST_ERROR * branch.rate, branch.rate, np.nan)
             rate.plot(branch.values * factor, known * MM, "o", mew=0, alpha=0.8, **markers)
-    blows.set_xscale("log")
-    ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if x[0] <= t <= x[-1]]
-    rate.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    rate.minorticks_off()
+    plain_ticks(rate, branches["falling"][0].values * factor)
     rate.set_ylim(0.0, 1.6 * float(np.median(branches["falling"][0].rate)) * MM)
     for line in rate.lines:
         line.set_markersize(2.0 * line.get_markersize())

@@ -10,7 +10,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 
 from examples.shared import command_line, tell
@@ -22,7 +21,6 @@ from percussion_model.analysis.fitting import (
     fit_rock,
     slow_force,
 )
-from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.calibration import save_calibration
 
 NAME = "calibration"
@@ -73,8 +71,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
             scene, curve, measured_drops(scene, noise, 450),
             progress=lambda done: tell(f"{done} computations done"),
         )  # fmt: skip
-    with matplotlib.rc_context(style.STYLE):
-        save_calibration(fit, Path(out) / f"{NAME}.png")
+    save_calibration(fit, Path(out) / f"{NAME}.png")
     return fit.summary() | {"truth": TRUTH}
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import ListedColormap
 
-from examples.shared import GREY, command_line, figure_of, tell
+from examples.shared import GREY, command_line, figure_of, plain_ticks, study_points
 from percussion_model import Scene
-from percussion_model.analysis.study import Study, grid, study
+from percussion_model.analysis.study import Study, grid
 from percussion_model.analysis.study.response import KINDS
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM
@@ -54,11 +54,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     feed = np.geomspace(500.0, 20e3, feeds)
     pressure = np.linspace(5.0 if quick else 2.5, 30.0 if quick else 40.0, pressures) * BAR
     points = grid({"feed.force": feed, "drive.force": pressure * AREA})
-    processes = 1 if quick else None
-    found = study(
-        Scene(), points, out / "points", most_blows=MOST_BLOWS, processes=processes,
-        progress=lambda done, total: tell(f"{done} of {total} points", done / total),
-    )  # fmt: skip
+    found = study_points(points, out, quick, MOST_BLOWS)
     rows = found.rows.reshape(points.shape)
     share = efficiency(found).reshape(points.shape)
     unknown = ~(rows["rate_of_penetration_error"] < MOST_ERROR * rows["rate_of_penetration"])
@@ -81,10 +77,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         ax.plot(reference.feed.force / KN, PRESSURE / BAR, "o", color="white", mec="black")
         ax.annotate("reference", (reference.feed.force / KN, PRESSURE / BAR), (-7, -3),
                     textcoords="offset points", color="white", ha="right")  # fmt: skip
-        ax.set_xscale("log")
-        ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if x[0] <= t <= x[-1]]
-        ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-        ax.minorticks_off()
+        plain_ticks(ax, x)
         ax.grid(False)
         style.label(ax, "feed force [kN]", "supply pressure, gauge [bar]")
         style.head(fig, "Rate of penetration, and efficiency of the drive (white)")

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from examples.shared import BLUE, ORANGE, command_line, figure_of, tell
+from examples.shared import BLUE, ORANGE, command_line, figure_of, study_points
 from percussion_model import Scene
-from percussion_model.analysis.study import study, table
+from percussion_model.analysis.study import table
 from percussion_model.interface.plotting import style
 
 NAME = "sensitivity"
@@ -49,11 +49,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     count = 4 if quick else 256
     drawn = np.exp(samples.sample(problem, count, calc_second_order=False, seed=SEED))
     points = table(dict(zip(PARAMETERS, drawn.T, strict=True)))
-    processes = 1 if quick else None
-    found = study(
-        scene, points, out / "points", most_blows=MOST_BLOWS, processes=processes,
-        progress=lambda done, total: tell(f"{done} of {total} points", done / total),
-    )  # fmt: skip
+    found = study_points(points, out, quick, MOST_BLOWS)
     rate = found.rows["rate_of_penetration"]
     if not np.isfinite(rate).all():
         raise SystemExit(f"{np.sum(~np.isfinite(rate))} points have no rate: see {out / 'points'}")

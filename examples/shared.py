@@ -10,8 +10,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from percussion_model import Scene
+from percussion_model.analysis.study import Points, Study, study
 from percussion_model.interface.commands.common import end_script
 from percussion_model.interface.plotting import style
 from percussion_model.interface.progress import Report, progress
@@ -33,6 +37,22 @@ def tell(text: str, share: float | None = None) -> None:
     """Say what an example does at present, and which share of it is done."""
     for report in _reports:
         report(text, share)
+
+
+def study_points(points: Points, out: Path, quick: bool, most_blows: int) -> Study:
+    """Study points around the reference, and say how far it is."""
+    return study(
+        Scene(), points, out / "points", most_blows=most_blows, processes=1 if quick else None,
+        progress=lambda done, total: tell(f"{done} of {total} points", done / total),
+    )  # fmt: skip
+
+
+def plain_ticks(ax: Axes, x: np.ndarray) -> None:
+    """Write plain numbers on a logarithmic axis that spans `x`."""
+    ax.set_xscale("log")
+    ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if x[0] <= t <= x[-1]]
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    ax.minorticks_off()
 
 
 @contextmanager

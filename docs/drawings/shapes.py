@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.text import Text
 
@@ -14,8 +13,6 @@ Place = tuple[float, float]
 INK = "#222222"
 NOTE = "#595959"
 SMALL = 8.0
-# Boxes of texts have a margin: they may overlap by so much [pixel].
-TOUCHING = 1.0
 
 
 def blank(ax: Axes, width: float, height: float, equal: bool = False) -> None:
@@ -61,43 +58,3 @@ def lines_of_text(
         ax.text(place[0], place[1] + k * step, line, va="center", **look)
         for k, line in enumerate(lines)
     ]
-
-
-def misplaced_texts(fig: Figure) -> list[str]:
-    """Texts of a drawn figure that leave it, or lie on each other; none in a good one."""
-    fig.draw_without_rendering()
-    unseen = _unseen_ticks(fig)
-    texts = [one for one in fig.findobj(Text) if one.get_visible() and one.get_text().strip()]
-    boxes = [
-        (one.get_text(), one.get_window_extent())
-        for one in texts
-        if _is_shown(one) and one not in unseen
-    ]
-    frame, found = fig.bbox, []
-    for k, (text, one) in enumerate(boxes):
-        if one.x0 < frame.x0 or one.y0 < frame.y0 or one.x1 > frame.x1 or one.y1 > frame.y1:
-            found.append(f"{text!r} leaves the figure")
-        for other, two in boxes[k + 1 :]:
-            wide = min(one.x1, two.x1) - max(one.x0, two.x0)
-            high = min(one.y1, two.y1) - max(one.y0, two.y0)
-            if wide > TOUCHING and high > TOUCHING:
-                found.append(f"{text!r} lies on {other!r}")
-    return found
-
-
-def _unseen_ticks(fig: Figure) -> set[Text]:
-    """Labels of ticks beyond the ends of their axis, which exist but are not drawn."""
-    found = set()
-    for ax in fig.axes:
-        for axis in (ax.xaxis, ax.yaxis):
-            low, high = sorted(axis.get_view_interval())
-            room = 1e-9 * (high - low)
-            for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
-                if not low - room <= tick.get_loc() <= high + room:
-                    found |= {tick.label1, tick.label2}
-    return found
-
-
-def _is_shown(text: Text) -> bool:
-    """Whether a text is drawn at all: the names of axes that are off are not."""
-    return text.axes is None or text.axes.axison or text in text.axes.texts

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ from matplotlib.lines import Line2D
 from docs.drawings.shapes import INK, NOTE, SMALL, Place, arrow, blank, box, lines_of_text
 from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import HAMMER, SYSTEMS, SystemPlan, read_plan
+from fmu_src.variables import Variable
 from percussion_model.interface.plotting import style
 
 SYSTEM = SYSTEMS / "feed_control.toml"
@@ -85,6 +87,16 @@ ROUTES = {
 STEP_OF_LINES = 0.36
 
 
+def connected(plan: SystemPlan) -> Iterator[tuple[str, str, Variable | None]]:
+    """Source and sink of each connection, and what is known of its variable."""
+    variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
+    for sink, source in plan.connections.items():
+        # the hammer is no part: what it gives or takes is known by the other end
+        ends = (signal.partition(".") for signal in (source, sink))
+        known = (variables.get(plan.components[one], {}).get(name) for one, _, name in ends)
+        yield source, sink, next(filter(None, known), None)
+
+
 def signals(plan: SystemPlan) -> dict[tuple[str, str], list[str]]:
     """Outputs that go from component to component, each with its unit.
 
@@ -93,19 +105,13 @@ def signals(plan: SystemPlan) -> dict[tuple[str, str], list[str]]:
     dict of list
         By names of source and sink.
     """
-    variables = {name: {v.name: v for v in part_variables(part)} for name, part in PARTS.items()}
     found: dict[tuple[str, str], list[str]] = {}
-    for sink, source in plan.connections.items():
+    for source, sink, one in connected(plan):
         component, _, name = source.partition(".")
-        receiver, _, received = sink.partition(".")
-        # the hammer is no part: what it gives or takes is known by the other end
-        ends = ((component, name), (receiver, received))
-        known = (variables.get(plan.components[one], {}).get(signal) for one, signal in ends)
-        one = next(filter(None, known), None)
         unit = f" [{one.unit}]" if one and one.unit else ""
         if one and one.type == "Boolean":
             unit = " [on/off]"
-        found.setdefault((component, receiver), []).append(name + unit)
+        found.setdefault((component, sink.partition(".")[0]), []).append(name + unit)
     return found
 
 

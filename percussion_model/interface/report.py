@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from percussion_model.analysis.drill_string import Extreme
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
+from percussion_model.interface.pages import filled
 from percussion_model.interface.plotting import CAPTIONS, figures, watched_string
 from percussion_model.interface.plotting.window import (
     StressField,
@@ -23,7 +23,6 @@ from percussion_model.interface.plotting.window import (
     last_blow,
     peak_stresses,
 )
-from percussion_model.scene.group import Parameters
 from percussion_model.scene.parameters import HOLE_DIAMETER, find_row, parameter_table
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
@@ -218,9 +217,8 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         from percussion_model.interface.plotting.interactive import embedded
         from percussion_model.interface.plotting.interactive_run import interactive_figures
 
-        made = interactive_figures(result, blow)
-        places, scripts = embedded(list(made.values()))
-        blocks |= {name: Markup(place) for name, place in zip(made, places, strict=True)}
+        places, scripts = embedded(interactive_figures(result, blow))
+        blocks |= {name: Markup(place) for name, place in places.items()}
     summary = result.summary()
     scene = result.scene
     # The run may have other times than the scene.
@@ -375,12 +373,8 @@ def render_study_report(found: Study) -> str:
         from percussion_model.interface.plotting.interactive import embedded
         from percussion_model.interface.plotting.interactive_study import interactive_study
 
-        made = interactive_study(found)
-        places, scripts = embedded(list(made.values()))
-        blocks = [
-            FigureBlock(Markup(place), STUDY_CAPTIONS[name])
-            for name, place in zip(made, places, strict=True)
-        ]
+        places, scripts = embedded(interactive_study(found))
+        blocks = [FigureBlock(Markup(one), STUDY_CAPTIONS[name]) for name, one in places.items()]
     points = found.points
     failed = [k for k, text in enumerate(found.failures) if text]
     return _render(
@@ -418,14 +412,8 @@ def _write_page(folder: Path, page: str) -> Path:
 
 def _render(template: str, scene: Scene, changed: dict[str, Any], **values: Any) -> str:
     """Fill a template that shows a scene, with parameters that the run replaced."""
-    environment = Environment(
-        loader=PackageLoader("percussion_model.interface", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    return environment.get_template(template).render(
+    return filled(
+        template,
         title=scene.title or "Percussive drilling",
         parameters=_parameter_rows(scene, changed),
         effects_on=scene.effects_on,
@@ -442,32 +430,24 @@ def _parameter_rows(scene: Scene, changed: dict[str, Any]) -> list[tuple[str, st
     for row in (HOLE_DIAMETER, *parameter_table()):
         if row is HOLE_DIAMETER and scene.hole_diameter is None:
             continue
-        if "*" in row.key or not scene.matters(row.key):
-            continue
-        if row.kind in ("sections", "rods"):
-            rows += _listed_rows(scene[row.key], row.key, changed)
-            continue
-        value = changed.get(row.key, scene[row.key])
-        rows.append((row.key, _written(value), _shown_unit(row.unit), row.description))
+        if "*" not in row.key and scene.matters(row.key):
+            rows += _rows_of(scene[row.key], row.key, changed)
     return rows
 
 
-def _listed_rows(
-    entries: Iterable[Parameters], path: str, changed: dict[str, Any]
-) -> list[tuple[str, str, str, str]]:
-    """Rows of the sections of a bar, or of bars with their sections."""
-    rows = []
-    for k, entry in enumerate(entries):
-        for name in entry.telling:
-            key, value = f"{path}.{k}.{name}", getattr(entry, name)
-            if isinstance(value, tuple):
-                rows += _listed_rows(value, key, changed)
-                continue
-            row = find_row(key)
-            assert row is not None
-            shown = _written(changed.get(key, value))
-            rows.append((key, shown, _shown_unit(row.unit), row.description))
-    return rows
+def _rows_of(value: Any, key: str, changed: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """The row of a value; those of the sections of a bar, or of bars with their sections."""
+    if isinstance(value, tuple):
+        return [
+            row
+            for k, entry in enumerate(value)
+            for name in entry.telling
+            for row in _rows_of(getattr(entry, name), f"{key}.{k}.{name}", changed)
+        ]
+    row = find_row(key)
+    assert row is not None
+    shown = _written(changed.get(key, value))
+    return [(key, shown, _shown_unit(row.unit), row.description)]
 
 
 def _written(value: Any) -> str:

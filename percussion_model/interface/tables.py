@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from copy import copy
 from itertools import islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Column, Table
 from rich.text import Text
+
+from percussion_model.interface.messages import wrapped
 
 # More characters than any table has.
 ENDLESS = 10_000
@@ -20,6 +24,43 @@ class Size(NamedTuple):
 
     least: int
     most: int
+
+
+def named_table(rows: Iterable[tuple[str, str]], title: str = "") -> Table:
+    """A table of names and of texts that may be broken, without headings."""
+    table = Table(title=escape(title) or None, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for name, text in rows:
+        table.add_row(name, text)
+    return table
+
+
+def airy_table(
+    headings: Iterable[str], left: Collection[str], words: Collection[str] = (), **look: Any
+) -> Table:
+    """A table without a frame, whose columns stand at the right.
+
+    Parameters
+    ----------
+    headings : iterable of str
+    left : collection of str
+        Headings of columns that stand at the left.
+    words : collection of str
+        Headings of columns whose lines may be broken.
+    **look
+        More for `Table`.
+    """
+    table = Table(box=SIMPLE_HEAD, show_edge=False, **look)
+    for one in headings:
+        table.add_column(one, justify="left" if one in left else "right", no_wrap=one not in words)
+    return table
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print texts in lines that fit."""
+    for note in notes:
+        Console().print(wrapped(note), highlight=False)
 
 
 def print_table(

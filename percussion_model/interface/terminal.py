@@ -6,14 +6,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
 from percussion_model.interface.messages import wrapped
-from percussion_model.interface.tables import print_table
+from percussion_model.interface.tables import airy_table, named_table, print_notes, print_table
 from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
 from percussion_model.simulation.uncertain import (
@@ -114,12 +113,11 @@ def show_summary(result: Result) -> None:
     whose = "" if result.scene.solver.accuracy is None else ", all runs"
     table.add_row("Computed in", in_digits(result.wall_time, TIMED), f"s{whose}")
     table.add_row("Speed", in_digits(result.real_time_factor, TIMED), "× real time")
-    console = Console()
-    print_table(table, console, keys=2)
+    print_table(table, keys=2)
     if len(result.counted) or result.fall:
         note = f" {ABOUT_NUMBER}." if unknown else ""
-        console.print(wrapped(about_errors(summary) + note), highlight=False)
-    show_warnings(console, result.warnings)
+        print_notes([about_errors(summary) + note])
+    show_warnings(result.warnings)
 
 
 def _add_driller_row(table: Table, summary: Mapping[str, Any], key: str) -> None:
@@ -135,10 +133,7 @@ def _add_driller_row(table: Table, summary: Mapping[str, Any], key: str) -> None
 def show_settled(found: Settled) -> None:
     """Print the stationary response of a scene."""
     summary = found.summary()
-    table = Table(show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column()
-    table.add_row("Motion", f"{found.motion}{on_other_grids(found)}")
+    table = named_table([("Motion", f"{found.motion}{on_other_grids(found)}")])
     if summary[RATE[1]] is not None:
         table.add_row(RATE[0], f"{rate_text(summary)} {RATE[3]}")
         one = DRILLER_NUMBERS[RATE[1]]
@@ -154,11 +149,10 @@ def show_settled(found: Settled) -> None:
         table.add_row("Deviation after a cycle", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{in_digits(found.wall_time, TIMED)} s")
-    console = Console()
-    print_table(table, console)
+    print_table(table)
     if found.error_of:
-        console.print(wrapped(settled_error(found)), highlight=False)
-    show_warnings(console, found.warnings)
+        print_notes([settled_error(found)])
+    show_warnings(found.warnings)
 
 
 def _with_driller_unit(summary: Mapping[str, Any], key: str) -> str:
@@ -199,35 +193,30 @@ def settled_error(found: Settled) -> str:
 
 def show_study(found: Study) -> None:
     """Print the headlines of a study, and how many of its points failed."""
-    table = Table(show_header=False)
-    table.add_column(no_wrap=True)
-    for name, text in found.headlines():
-        table.add_row(name, text)
-    console = Console()
-    print_table(table, console)
+    print_table(named_table(found.headlines()))
     failed = [k for k, text in enumerate(found.failures) if text]
     if failed:
         first = f"{found.place(failed[0])}: {found.failures[failed[0]]}"
         count = f"{len(failed)} of {len(found.points)} points failed"
-        show_warnings(console, [f"{count}, the first at {first}"])
+        show_warnings([f"{count}, the first at {first}"])
 
 
-def show_warnings(console: Console, warnings: list[str]) -> None:
+def show_warnings(warnings: list[str]) -> None:
     """Print warnings, if there are any."""
     for text in warnings:
-        show_note(console, "warning", text)
+        show_note("warning", text)
 
 
-def show_note(console: Console, name: str, text: str) -> None:
+def show_note(name: str, text: str) -> None:
     """Print a text behind its name in yellow, in lines that fit."""
     lines = Text(wrapped(f"{name}: {text}"))
     lines.stylize("yellow", 0, len(name) + 1)
-    console.print(lines, soft_wrap=True)
+    Console().print(lines, soft_wrap=True)
 
 
-def _number(value: float | None, factor: float, digits: int = 5) -> str:
-    """Show a number in other units, `digits` of it, or a dash where there is none."""
-    return "-" if value is None else f"{factor * value:.{digits}g}"
+def _number(value: float | None) -> str:
+    """Two digits of a number, or a dash where there is none."""
+    return "-" if value is None else f"{value:.2g}"
 
 
 def show_explanation(scene: Scene, found: Forecast) -> None:
@@ -236,22 +225,20 @@ def show_explanation(scene: Scene, found: Forecast) -> None:
     from percussion_model.analysis.stationary import MOST_TIME
     from percussion_model.scene.rocks import rock_of
 
-    solver = found.solver
-    table = Table(title=escape(scene.title) or None, show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column()
-    table.add_row("Effects on", ", ".join(scene.effects_on) or "none")
-    table.add_row("Effects off", ", ".join(scene.effects_off) or "none")
-    table.add_row("Without effect here", ", ".join(scene.unused) or "none")
-    effects = scene.effects
+    solver, effects = found.solver, scene.effects
     named = rock_of(scene)
     whose = f" (numbers of {named})" if named else ""
-    table.add_row("Drive, rock", f"{effects.drive}, {effects.rock}{whose}")
-    table.add_row("Piston, bit", f"{scene.piston.model}, {scene.bit.model}")
-    for name, text in _scale_rows(scene):
-        table.add_row(name, text)
     why = f" (auto: {scene.why_solver})" if scene.why_solver else ""
-    table.add_row("Solver", f"{solver.name}{why}")
+    rows = [
+        ("Effects on", ", ".join(scene.effects_on) or "none"),
+        ("Effects off", ", ".join(scene.effects_off) or "none"),
+        ("Without effect here", ", ".join(scene.unused) or "none"),
+        ("Drive, rock", f"{effects.drive}, {effects.rock}{whose}"),
+        ("Piston, bit", f"{scene.piston.model}, {scene.bit.model}"),
+        *_scale_rows(scene),
+        ("Solver", f"{solver.name}{why}"),
+    ]
+    table = named_table(rows, scene.title)
     if scene.solver.accuracy is not None:
         table.add_row("Wanted accuracy of the rate", f"{scene.solver.accuracy:g}")
     if solver.time_step is not None:
@@ -328,15 +315,10 @@ def _scale_rows(scene: Scene) -> Iterator[tuple[str, str]]:
 def show_comparison(found: Comparison) -> None:
     """Print the numbers of several solvers, each beside its difference to the first."""
     summaries, changes = found.compared(), found.changes()
-    title = found.results[found.first].scene.title
-    table = Table(
-        title=escape(title) or None, box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0
-    )
-    table.add_column("")
-    for name in summaries:
-        table.add_column(name, justify="right", no_wrap=True)
-        if name in changes:
-            table.add_column(f"{name}\noff, %", justify="right", no_wrap=True)
+    title = escape(found.results[found.first].scene.title) or None
+    off = {name: [f"{name}\noff, %"] if name in changes else [] for name in summaries}
+    headings = ["", *(one for name in summaries for one in (name, *off[name]))]
+    table = airy_table(headings, [""], [""], title=title, pad_edge=False, padding=0)
     shown = []
     for label, key, factor, unit in WITHOUT_BLOWS if found.is_fall else (RATE, *SHOWN):
         if all(summary[key] is None for summary in summaries.values()):
@@ -361,12 +343,10 @@ def show_comparison(found: Comparison) -> None:
             cells.append("-" if found_here is None else in_digits(found_here, TIMED))
             cells += [""] * (name in changes)
         table.add_row(label, *cells)
-    console = Console()
     # a solver and its changes stay together
-    print_table(table, console, groups=[1, *[2] * len(changes)])
-    for note in _about_comparison(found, " ".join(shown)):
-        console.print(wrapped(note), highlight=False)
-    show_warnings(console, found.warnings())
+    print_table(table, groups=[1, *[2] * len(changes)])
+    print_notes(_about_comparison(found, " ".join(shown)))
+    show_warnings(found.warnings())
 
 
 def _about_comparison(found: Comparison, shown: str) -> Iterator[str]:
@@ -411,23 +391,19 @@ def show_stability(found: Collection) -> None:
     """Print the measures of each solver on each hard case, and the failures."""
     from percussion_model.verification.hard_cases.collection import DISAGREE, short_rate
 
-    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    for name in ("case", "solver"):
-        table.add_column(name, no_wrap=True)
-    for name in ("mm/s", "residual", "momentum", "events/s", "guards", "s"):
-        table.add_column(name, justify="right", no_wrap=True)
+    keys, numbers = ("case", "solver"), ("mm/s", "residual", "momentum", "events/s", "guards", "s")
+    table = airy_table(keys + numbers, keys, padding=(0, 1, 0, 0))
     for row in found.rows:
         table.add_row(
             row["case"],
             row["solver"],
             short_rate(row),
-            *(_number(row[key], 1.0, 2) for key in ("residual", "momentum", "events_per_second")),
+            *(_number(row[key]) for key in ("residual", "momentum", "events_per_second")),
             str(row["guards"] or ""),
             in_digits(row["wall_time"], TIMED),
         )
-    console = Console()
-    print_table(table, console, keys=2)
-    show_warnings(console, found.failures())
+    print_table(table, keys=2)
+    show_warnings(found.failures())
     cases = len({row["case"] for row in found.rows})
     failed = len(found.failures())
     decided = [entry["decided"] for entry in found.disagreements()]
@@ -438,10 +414,8 @@ def show_stability(found: Collection) -> None:
         f"first solver's rate: {sum(decided)}; undecided, since their errors reach so far: "
         f"{len(decided) - sum(decided)}."
     )
-    console.print(wrapped(f"{found.about_errors()} {NOT_THE_MODEL}"), highlight=False)
-    console.print(wrapped(verdict), highlight=False)
-    for text in found.about_left_out():
-        console.print(wrapped(text), highlight=False)
+    errors = f"{found.about_errors()} {NOT_THE_MODEL}"
+    print_notes([errors, verdict, *found.about_left_out()])
 
 
 def _counted(count: int, what: str) -> str:
@@ -464,6 +438,5 @@ def show_statements(statements: list[Statement], errors: str) -> None:
         if one.why and not one.agrees:
             table.add_row("", f"why: {escape(one.why)}")
         table.add_row("", "")
-    console = Console()
-    print_table(table, console)
-    console.print(errors, highlight=False)
+    print_table(table)
+    Console().print(errors, highlight=False)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from math import isfinite
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from percussion_model.interface.tables import print_table
+from percussion_model.interface.tables import airy_table, print_table
 from percussion_model.simulation.uncertain import in_digits, with_error
 from percussion_model.verification.accuracy.advantage import (
     UNDECIDED,
@@ -63,17 +62,16 @@ FAMILIES = {
 
 def show_study(found: Study) -> None:
     """Print reference, points, orders, what accuracies cost, and advice."""
-    console = Console()
-    show_bars(found.reference, console)
-    _show_points(found, console)
-    _show_orders(found, console)
-    _show_costs(found, console)
+    show_bars(found.reference)
+    _show_points(found)
+    _show_orders(found)
+    _show_costs(found)
     for wanted in WANTED:
-        console.print(found.advice(wanted), highlight=False)
+        _say(found.advice(wanted))
     for point in found.points:
         if point.note:
-            title = LADDERS[point.ladder].title
-            console.print(f"{title}, {point.label}: {escape(point.note)}", highlight=False)
+            _say(f"{LADDERS[point.ladder].title}, {point.label}: {escape(point.note)}")
+    console = Console()
     starts = ", ".join(f"{name} {two(time)} s" for name, time in found.compilation.items())
     console.print(f"First set-up in this process, compilation or its cache included: {starts}.")
     here = found.machine
@@ -81,12 +79,9 @@ def show_study(found: Study) -> None:
     console.print(f"{here['processor']}, {here['cores']} cores{load}; Python {here['python']}.")
 
 
-def show_bars(reference: Reference, console: Console | None = None) -> None:
+def show_bars(reference: Reference) -> None:
     """Print a reference with its bars, and by how much the limits of the two solvers differ."""
-    console = console or Console()
-    table = _table("quantity")
-    for heading in ("value", "bar,\nrelative", "solvers differ\nby, relative"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = _table("quantity", "value", "bar,\nrelative", "solvers differ\nby, relative")
     table.add_column("")
     for key, bar in reference.bars.items():
         quantity = QUANTITIES[key]
@@ -98,16 +93,15 @@ def show_bars(reference: Reference, console: Console | None = None) -> None:
             _number(bar.apart),
             f"no reference: {bar.doubt}" if bar.doubt else "",
         )
-    _print(f"Reference: {reference.title}", table, console)
+    _print(f"Reference: {reference.title}", table)
     promise = (
         "The bar is the standard error of the reference: the true value may lie outside of it."
         if reference.kind == APERIODIC
         else "The true value lies within the bar of the reference."
     )
-    console.print(
+    _say(
         f"{promise} Histories, through a blow, have no "
-        "one value: theirs is the mean distance by the mean size.",
-        highlight=False,
+        "one value: theirs is the mean distance by the mean size."
     )
 
 
@@ -116,17 +110,20 @@ def within_bar(factor: float, bar: Bar) -> str:
     return with_error(factor * bar.value, factor * bar.error).split(" ± ")[0]
 
 
-def _print(title: str, table: Table, console: Console, keys: int = 1) -> None:
+def _print(title: str, table: Table, keys: int = 1) -> None:
     """Print a table below its title, which may be wider than a table of few columns."""
-    console.print(escape(title), style="italic", highlight=False)
-    print_table(table, console, keys)
+    Console().print(escape(title), style="italic", highlight=False)
+    print_table(table, keys=keys)
 
 
-def _table(first: str) -> Table:
-    """An airy table: the columns of numbers need the room."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
-    table.add_column(first, no_wrap=True)
-    return table
+def _say(text: str) -> None:
+    """Print a text as it is."""
+    Console().print(text, highlight=False)
+
+
+def _table(first: str, *numbers: str) -> Table:
+    """A table of numbers, which need the room."""
+    return airy_table((first, *numbers), [first], padding=(0, 1, 0, 0))
 
 
 def _number(value: float) -> str:
@@ -140,51 +137,61 @@ def _error(found: Study, point: Point, key: str) -> str:
     return f"<{_number(floor)}" if error <= floor and floor > 0.0 else _number(error)
 
 
-def _show_points(found: Study, console: Console) -> None:
+def _show_points(found: Study) -> None:
     what = "Relative standard error" if found.kind == APERIODIC else "Relative error"
     keys = found.quantities
-    table = _table("method")
-    for heading in ("ms/s", "±, %", "set-up", *(SHORT[key] for key in keys)):
-        table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
+    headings = ("ms/s", "±, %", "set-up", *(SHORT[key] for key in keys))
+    table = _table("method", *(heading.replace(" ", "\n") for heading in headings))
     for name in found.names:
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
         for point in found.ladder(name):
             errors = [_error(found, point, key) for key in keys]
             spread = two(100 * point.spread) if isfinite(point.spread) else "-"
             times = [two(1e3 * point.second), spread, two(1e3 * point.setup)]
+<<<<<<< HEAD
             table.add_row(f" {point.label}", *times, *errors)
     _print(f"{what}; ms to compute a simulated second; ms of set-up", table, console)
     console.print(
+=======
+            table.add_row(f" {label}", *times, *errors)
+    _print(f"{what}; ms to compute a simulated second; ms of set-up", table)
+    _say(
+>>>>>>> L1-now
         f"A blow takes {found.period:.4g} s; its cost is that part of ms/s. ± is half the range of "
-        "repeated times; what has none, and every set-up, was timed once.",
-        highlight=False,
+        "repeated times; what has none, and every set-up, was timed once."
     )
     if any(found.floor(key) for key in keys):
+<<<<<<< HEAD
         console.print("< Below the bar of the reference, which tells no more.", highlight=False)
+=======
+        _say("< Below the bar of the reference, which tells no more.")
+    if any(point.fit > FITS for point in found.points):
+        _say(
+            "* Lengths that fit no common cell: the wave speed is off, and the setting is not in "
+            "the order of its method."
+        )
+>>>>>>> L1-now
 
 
-def _show_orders(found: Study, console: Console) -> None:
+def _show_orders(found: Study) -> None:
     keys = [key for key in found.quantities if any(found.order(name, key) for name in found.names)]
     if not keys:
-        console.print(
+        _say(
             "Measured orders: none; one takes three settings of a method with errors above the "
-            "bar of the reference.",
-            highlight=False,
+            "bar of the reference."
         )
         return
-    table = _table("method")
-    for key in keys:
-        table.add_column(SHORT[key].replace(" ", "\n"), justify="right", no_wrap=True)
+    table = _table("method", *(SHORT[key].replace(" ", "\n") for key in keys))
     for name in found.names:
         orders = [found.order(name, key) for key in keys]
         cells = ["-" if one is None else str(one).replace(" ", "") for one in orders]
         table.add_row(LADDERS[name].title, *cells)
-    _print("Measured orders, each against what the method refines", table, console)
+    _print("Measured orders, each against what the method refines", table)
     if "rigid" in found.names and found.kind != APERIODIC:
-        console.print(f"rigid: {LADDERS['rigid'].note}.", highlight=False)
+        _say(f"rigid: {LADDERS['rigid'].note}.")
 
 
-def _show_costs(found: Study, console: Console) -> None:
+def _show_costs(found: Study) -> None:
     """Print what errors of the first quantity cost own solvers, and the best of each family."""
     own = dict.fromkeys((found.own, "wave"))
     ladders = [name for name in own if name in found.names]
@@ -192,10 +199,8 @@ def _show_costs(found: Study, console: Console) -> None:
     families = {family: title for family, title in FAMILIES.items() if family in here}
     if not ladders and not families:
         return
-    table = _table("error")
-    for heading in (*(LADDERS[name].title.replace(", ", ",\n") for name in ladders),
-                    *families.values()):  # fmt: skip
-        table.add_column(heading, justify="right", no_wrap=True)
+    titles = [LADDERS[name].title.replace(", ", ",\n") for name in ladders]
+    table = _table("error", *titles, *families.values())
     bounds = ""
     for wanted in WANTED:
         costs = [found.cost(name, found.main, wanted) for name in ladders]
@@ -208,12 +213,11 @@ def _show_costs(found: Study, console: Console) -> None:
                 "-" if best is None else f"{_cost_text(best)}\n{LADDERS[best.ladder].title}"
             )
         table.add_row(f"{100 * wanted:g} %", *cells)
-    _print(f"ms to compute {found.timed} at an error in the {_compared(found)}", table, console)
-    console.print(
+    _print(f"ms to compute {found.timed} at an error in the {_compared(found)}", table)
+    _say(
         "Read off between the settings above, from where on the error is met for good, with the "
         f"range by the bar of the reference and the spread of the times. {bounds}What to "
-        "take is one of the settings themselves:",
-        highlight=False,
+        "take is one of the settings themselves:"
     )
 
 
@@ -224,10 +228,7 @@ def _compared(found: Study) -> str:
 
 def show_contests(studies: dict[str, Study]) -> None:
     """Print default solvers against the best of their peers: a table of all scenes, and ratios."""
-    console = Console()
-    table = _table("scene")
-    for heading in ("error", "solver", "set-up", "best peer", "set-up", "ratio"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = _table("scene", "error", "solver", "set-up", "best peer", "set-up", "ratio")
     table.add_column("the peer")
     found = [[contest(one, wanted) for wanted in WANTED] for one in studies.values()]
     whys = []
@@ -238,14 +239,13 @@ def show_contests(studies: dict[str, Study]) -> None:
             table.add_row(first, f"{100 * one.wanted:g} %", *_contest_cells(study, one))
         table.add_section()
         whys += [(name, one) for one in contests if one.why]
-    _print("The same error by the default solver and peers: ms to compute", table, console, keys=2)
+    _print("The same error by the default solver and peers: ms to compute", table, keys=2)
     for name, one in whys:
-        console.print(escape(f"{name}, {100 * one.wanted:g} %: {why_text(one)}."), highlight=False)
+        _say(escape(f"{name}, {100 * one.wanted:g} %: {why_text(one)}."))
     for what in dict.fromkeys((_compared(one), one.timed) for one in studies.values()):
         names = [name for name, one in studies.items() if (_compared(one), one.timed) == what]
-        text = f"{', '.join(names)}: error in the {what[0]}, ms to compute {what[1]}."
-        console.print(escape(text), highlight=False)
-    console.print(ABOUT_BOUNDS, highlight=False)
+        _say(escape(f"{', '.join(names)}: error in the {what[0]}, ms to compute {what[1]}."))
+    _say(ABOUT_BOUNDS)
     for column in zip(*found, strict=True):
         told = summary(column)
         text = f"{100 * told.wanted:g} %: no scene is decided."
@@ -255,7 +255,7 @@ def show_contests(studies: dict[str, Study]) -> None:
                 f"{bounds_text(told.median)} at the median, {bounds_text(told.worst)} at the "
                 f"worst of {told.scenes - told.undecided} scenes; {told.undecided} undecided."
             )
-        console.print(text, highlight=False)
+        _say(text)
 
 
 def _contest_cells(found: Study, one: Contest) -> tuple[str, ...]:

@@ -107,10 +107,7 @@ def bench_controller(
 
 def _show(scores: Sequence[Score]) -> None:
     """Print the table of the runs, their mean, and what the errors are."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
     from percussion_model.interface.bench_text import (
         COLUMNS,
@@ -121,21 +118,17 @@ def _show(scores: Sequence[Score]) -> None:
         mean_text,
         points_text,
     )
-    from percussion_model.interface.messages import wrapped
-    from percussion_model.interface.tables import print_table
+    from percussion_model.interface.tables import airy_table, print_notes, print_table
 
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="")
-    table.add_column("run", vertical="bottom", no_wrap=True)
-    for head in ("points", *(head for _, head, _, _ in COLUMNS)):
-        words = escape(head.replace(" [", "\n["))
-        table.add_column(words, justify="right", vertical="bottom", no_wrap=True)
+    heads = [escape(head.replace(" [", "\n[")) for _, head, _, _ in COLUMNS]
+    table = airy_table(["run", "points", *heads], ["run"], pad_edge=False, header_style="")
+    for column in table.columns:
+        column.vertical = "bottom"
     for score in scores:
         table.add_row(score.trial, points_text(score.points, score.points_error), *cells(score))
-    console = Console()
-    print_table(table, console)
-    console.print(f"mean of the points: {mean_text(scores)} of 100", highlight=False)
-    for text in (about_runs(scores), about_columns(), about_errors(scores)):
-        console.print(wrapped(text), highlight=False)
+    print_table(table)
+    mean = f"mean of the points: {mean_text(scores)} of 100"
+    print_notes([mean, about_runs(scores), about_columns(), about_errors(scores)])
 
 
 def _file_and_name(controller: str) -> tuple[str, str]:

@@ -175,7 +175,6 @@ def _read_range(word: str) -> tuple[str, tuple[float, float]]:
 
 
 def _show(found: Fit, scene: Scene) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from percussion_model.analysis.fitting.found import NAMES
@@ -195,8 +194,7 @@ def _show(found: Fit, scene: Scene) -> None:
     for key in found.kept:
         unit = scene.row_of(key).unit
         table.add_row(NAMES[key], unit, f"{scene[key]:.4g}", "not fitted", "kept")
-    console = Console()
-    print_table(table, console)
+    print_table(table)
     noises = Table("measurement", "data", "noise", "", box=None)
     sensors = Table("sensor of", "has", "found", "±", "prior ±", box=None)
     for source in found.explained:
@@ -205,7 +203,7 @@ def _show(found: Fit, scene: Scene) -> None:
         noises.add_row(source.name, str(len(source.data)), noise, word)
         for it in source.sensor:
             sensors.add_row(source.name, it.name, *it.texts())
-    print_table(noises, console)
+    print_table(noises)
     if sensors.rows:
-        print_table(sensors, console)
-    show_warnings(console, found.warnings)
+        print_table(sensors)
+    show_warnings(found.warnings)

@@ -49,8 +49,8 @@ class BadValue(typer.BadParameter):
     """
 
 
-def number_of(key: str, option: str) -> Callable[[str], float]:
-    """Return what reads an option whose value is that of a parameter, with its unit or in SI."""
+def number_option(option: str, metavar: str, key: str, words: str) -> Any:
+    """Return an option whose value is that of a parameter, with its unit or in SI."""
 
     def read(text: str) -> float:
         from percussion_model.scene.parameters import read_number
@@ -61,7 +61,7 @@ def number_of(key: str, option: str) -> Callable[[str], float]:
         except SceneError as error:
             raise BadValue(str(error)) from None
 
-    return read
+    return typer.Option(option, metavar=metavar, parser=read, help=words)
 
 
 SceneFile = Annotated[
@@ -91,14 +91,9 @@ RockName = Annotated[
         "wins. `percussion rocks` lists them.",
     ),
 ]
+_ACCURACY = "Wanted relative error of the rate, in place of cells."
 Accuracy = Annotated[
-    float | None,
-    typer.Option(
-        "--accuracy",
-        metavar="ERROR",
-        parser=number_of("solver.accuracy", "--accuracy"),
-        help="Wanted relative error of the rate, in place of cells.",
-    ),
+    float | None, number_option("--accuracy", "ERROR", "solver.accuracy", _ACCURACY)
 ]
 Check = Annotated[
     bool | None, typer.Option("--check/--no-check", help="Verify --accuracy by a finer run.")
@@ -110,24 +105,10 @@ ErrorEstimate = Annotated[
         help="Estimate the error of the rate by short runs on coarser cells.",
     ),
 ]
-Duration = Annotated[
-    float | None,
-    typer.Option(
-        "--duration",
-        metavar="TIME",
-        parser=number_of("run.duration", "--duration"),
-        help="Simulated time, in s or with its unit.",
-    ),
-]
-Settle = Annotated[
-    float | None,
-    typer.Option(
-        "--settle",
-        metavar="TIME",
-        parser=number_of("run.settle", "--settle"),
-        help="Time before blows count, in s or with its unit.",
-    ),
-]
+_DURATION = "Simulated time, in s or with its unit."
+Duration = Annotated[float | None, number_option("--duration", "TIME", "run.duration", _DURATION)]
+_SETTLE = "Time before blows count, in s or with its unit."
+Settle = Annotated[float | None, number_option("--settle", "TIME", "run.settle", _SETTLE)]
 JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),

@@ -66,7 +66,7 @@ def effects(
             common.list_files([*files, claimed.sign()])
 
 
-# A longer name of an effect takes several lines.
+# Of an effect, in characters.
 LONGEST_NAME = 14
 # Behind a step that turning an effect off made dearer.
 DEARER = "*"
@@ -133,39 +133,27 @@ def table_of(found: EffectsStudy) -> tuple[list[str], list[list[str]], dict[str,
 
 def show_effects(found: EffectsStudy) -> None:
     """Print the table, and why something is missing from it."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
-    from percussion_model.interface.messages import wrapped
-    from percussion_model.interface.tables import print_table
+    from percussion_model.interface.tables import airy_table, print_notes, print_table
     from percussion_model.interface.terminal import show_note, show_warnings
 
     headings, rows, reasons = table_of(found)
-    table = Table(
-        title=escape(found.scene.title) or None,
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-        padding=0,
-    )
-    for k, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if k else "left", no_wrap=True)
+    look: dict[str, Any] = {"title_justify": "left", "pad_edge": False, "padding": 0}
+    table = airy_table(headings, [""], title=escape(found.scene.title) or None, **look)
     for name, *cells in rows:
-        table.add_row(_in_lines(name), *cells)
-    console = Console()
-    print_table(table, console)
+        # a longer name takes several lines
+        name = textwrap.fill(name, LONGEST_NAME, subsequent_indent="  ", break_long_words=False)
+        table.add_row(name, *cells)
+    print_table(table)
     if any(map(found.is_costlier, found.trials)):
-        show_note(console, DEARER, "turning the effect off made a time step dearer")
+        show_note(DEARER, "turning the effect off made a time step dearer")
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
-        show_note(console, names, reason)
+        show_note(names, reason)
     if len(found.base.result.counted) or found.base.result.fall:
-        for note in _notes(found, rows):
-            console.print(wrapped(note), highlight=False)
-    show_warnings(console, found.warnings())
+        print_notes(_notes(found, rows))
+    show_warnings(found.warnings())
 
 
 def _notes(found: EffectsStudy, rows: list[list[str]]) -> Iterator[str]:
@@ -191,11 +179,6 @@ def _known(row: dict[str, Any], key: str) -> str:
     if value is not None and error is None:
         return ABOUT + in_digits(1e3 * value)
     return in_few_characters(scaled(1e3, value), scaled(1e3, error), LEAST_ERROR)
-
-
-def _in_lines(name: str) -> str:
-    """Lines of a long name."""
-    return textwrap.fill(name, LONGEST_NAME, subsequent_indent="  ", break_long_words=False)
 
 
 def _number(value: float | None, factor: float, digits: int) -> str:

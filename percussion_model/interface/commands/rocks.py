@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -54,18 +54,15 @@ def rocks(
 
     common.check_json(json_file)
     chosen = [rock(one) for one in names()] if name is None else [read_rock(name)]
-    common.write_json(json_file, {one.name: as_values(one) for one in chosen})
+    common.write_json(
+        json_file, {one.name: asdict(one) | {"parameters": one.parameters} for one in chosen}
+    )
     if json_file == "-":
         return
     if name is None:
         show_rocks(chosen)
     else:
         show_rock(chosen[0])
-
-
-def as_values(rock: Rock) -> dict[str, Any]:
-    """Return a rock as plain values, SI units."""
-    return asdict(rock) | {"parameters": rock.parameters}
 
 
 def interval_text(one: Number) -> str:
@@ -109,40 +106,21 @@ def details(rock: Rock) -> Iterable[tuple[str, str]]:
 
 def show_rocks(chosen: Sequence[Rock]) -> None:
     """Print the table of rocks, and what its words mean."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
+    from percussion_model.interface.tables import airy_table, print_notes, print_table
 
-    from percussion_model.interface.messages import wrapped
-    from percussion_model.interface.tables import print_table
-
-    console = Console()
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for heading in HEADINGS:
-        table.add_column(heading, no_wrap=heading not in WORDS)
+    table = airy_table(HEADINGS, HEADINGS, WORDS, pad_edge=False)
     for one in chosen:
         table.add_row(*cells(one))
-    print_table(table, console, groups=GROUPS)
-    console.print()
-    for note in (*NOTES, "`percussion rocks NAME` tells all of one."):
-        console.print(wrapped(note), highlight=False)
+    print_table(table, groups=GROUPS)
+    print_notes(["", *NOTES, "`percussion rocks NAME` tells all of one."])
 
 
 def show_rock(chosen: Rock) -> None:
     """Print all that is known of a rock."""
-    from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
-    from percussion_model.interface.messages import wrapped
-    from percussion_model.interface.tables import print_table
+    from percussion_model.interface.tables import named_table, print_notes, print_table
 
-    console = Console()
-    table = Table(title=escape(chosen.title), show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column()
-    for name, text in details(chosen):
-        table.add_row(name, escape(text))
-    print_table(table, console)
-    for note in NOTES:
-        console.print(wrapped(note), highlight=False)
+    rows = ((name, escape(text)) for name, text in details(chosen))
+    print_table(named_table(rows, chosen.title))
+    print_notes(NOTES)

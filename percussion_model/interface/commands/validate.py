@@ -84,40 +84,35 @@ def _write(found: Comparison, claimed: Claim, figures: bool) -> None:
 
 def show_validation(found: Comparison) -> None:
     """Print the table, fit after fit, and what its errors are."""
-    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
     from percussion_model.interface.messages import wrapped
-    from percussion_model.interface.tables import print_table
+    from percussion_model.interface.tables import airy_table, print_notes, print_table
     from percussion_model.interface.terminal import show_note
     from percussion_model.verification.measured import table as texts
 
     console = Console()
 
     def print_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-        table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
-        for k, heading in enumerate(headings):
-            justify = "right" if texts.is_number(heading) else "left"
-            table.add_column(heading, justify=justify, no_wrap=k > 0)  # type: ignore[arg-type]
+        left = [heading for heading in headings if not texts.is_number(heading)]
+        table = airy_table(headings, left, headings[:1], pad_edge=False, padding=0)
         for row in rows:
             table.add_row(*row)
-        print_table(table, console)
+        print_table(table)
         console.print()
 
     titles = {one.name: one.title for one in found.experiments}
     for fit in found.fits:
         head = f"{titles[fit.experiment]}. Law {fit.law}, fit {fit.name}:"
         console.print(f"[bold]{escape(wrapped(head))}[/bold]", highlight=False)
-        console.print(wrapped(texts.parameters_text(fit)), highlight=False)
+        print_notes([texts.parameters_text(fit)])
         print_rows(texts.HEADINGS, map(texts.cells, found.of(fit.experiment, fit.name)))
     for title, headings, rows in texts.variant_tables(found):
         console.print(f"[bold]{escape(wrapped(title))}[/bold]", highlight=False)
         print_rows(headings, rows)
     for name, why in texts.reasons_of_variants(found).items():
-        show_note(console, name, why)
+        show_note(name, why)
     for why, ids in texts.reasons(found).items():
-        show_note(console, f"no criterion for {', '.join(ids)}", why)
-    for note in (*texts.NOTES, texts.count_text(found)):
-        console.print(wrapped(note), highlight=False)
+        show_note(f"no criterion for {', '.join(ids)}", why)
+    print_notes([*texts.NOTES, texts.count_text(found)])

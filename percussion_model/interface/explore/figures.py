@@ -88,22 +88,25 @@ class Figures:
         """Show a response; nothing where there is none."""
         window = response.window
         curves = _curves(window)
-        self.contact.data = curves["contact"]
+        self.contact.data = _columns(*curves["contact"][:2])
         self._draw_stress(response)
-        for columns, line in ((self.force, _force(window)), (self.path, _path(window))):
-            columns.data = _mode_columns(*line)
+        self.force.data = _mode_columns(*curves["force"])
+        self.path.data = _mode_columns(*curves["path"])
         self._fit()
         if window is None:
             return
         start, end = min(0.0, float(window.time[0])), window.active_until
         _move(self.forces.x_range, *_rounded(start * MS, end * MS))
-        _move(self.law.x_range, *_rounded(*_touching(window)))
+        depth, _, modes = curves["path"]
+        _move(self.law.x_range, *_rounded(*_touching(depth, modes)))
 
     def pin(self, response: Response | None) -> None:
         """Keep the curves of a response in grey, or of none."""
         curves = _curves(None if response is None else response.window)
         for name, columns in self.pinned.items():
-            columns.data = curves[name]
+            x, y, modes = curves[name]
+            in_flight = (modes == Mode.FF) & (name == "path")
+            columns.data = _columns(np.where(in_flight, np.nan, x), y)
         self._fit()
 
     def _fit(self) -> None:
@@ -201,43 +204,28 @@ def _move(to: Range1d, start: float, end: float) -> None:
 
 
 Line = tuple[np.ndarray, np.ndarray, np.ndarray]
-_NOTHING: Line = EMPTY, EMPTY, EMPTY
 
 
-def _force(window: Window | None) -> Line:
-    """Time [ms], force on the rock [kN] and mode, as far as the bit is active."""
+def _curves(window: Window | None) -> dict[str, Line]:
+    """Forces on bit and rock [kN] over time [ms], that on the rock over penetration [mm]; modes.
+
+    Time goes as far as the bit is active, the path in the law of the rock from the impact on.
+    """
     if window is None:
-        return _NOTHING
-    shown = window.time <= REACH * window.active_until
-    force, modes = window.samples["bit_force"], window.samples["drilling_mode"]
-    return window.time[shown] * MS, force[shown] / KN, modes[shown]
+        return dict.fromkeys(("contact", "force", "path"), (EMPTY, EMPTY, EMPTY))
+    shown, inside = window.time <= REACH * window.active_until, window.time >= 0.0
+    time, depth = window.time[shown] * MS, window.since_start("bit_end_position") * MM
+    force, modes = window.samples["bit_force"] / KN, window.samples["drilling_mode"]
+    pushed = np.nan_to_num(window.samples["contact_force"]) / KN
+    return {
+        "contact": (time, pushed[shown], modes[shown]),
+        "force": (time, force[shown], modes[shown]),
+        "path": (depth[inside], force[inside], modes[inside]),
+    }
 
 
-def _path(window: Window | None) -> Line:
-    """Penetration [mm], force on the rock [kN] and mode from the impact on."""
-    if window is None:
-        return _NOTHING
-    inside = window.time >= 0.0
-    depth, force = window.since_start("bit_end_position"), window.samples["bit_force"]
-    return depth[inside] * MM, force[inside] / KN, window.samples["drilling_mode"][inside]
-
-
-def _touching(window: Window) -> tuple[float, float]:
+def _touching(depth: np.ndarray, modes: np.ndarray) -> tuple[float, float]:
     """Stretch of penetration in which the bit is on the rock, with some room [mm]."""
-    depth, _, modes = _path(window)
     touching = depth[modes != Mode.FF] if (modes != Mode.FF).any() else depth
     room = ROOM * float(np.ptp(touching)) or 1.0
     return float(touching.min()) - room, float(touching.max()) + room
-
-
-def _curves(window: Window | None) -> dict[str, Any]:
-    """Columns of the curves that can be pinned."""
-    time, force, _ = _force(window)
-    depth, resistance, modes = _path(window)
-    if window is None:
-        pushed = EMPTY
-    else:
-        pushed = np.nan_to_num(window.samples["contact_force"][: len(time)]) / KN
-        depth = np.where(modes == Mode.FF, np.nan, depth)
-    lines = {"contact": (time, pushed), "force": (time, force), "path": (depth, resistance)}
-    return {name: _columns(x, y) for name, (x, y) in lines.items()}

@@ -80,7 +80,20 @@ def short(value: float) -> str:
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
 
 
-class Entry:
+class Quiet:
+    """Widgets that are changed without hearing of it."""
+
+    _quiet = False
+
+    def _set(self, widget: Any, **values: Any) -> None:
+        self._quiet = True
+        try:
+            widget.update(**values)
+        finally:
+            self._quiet = False
+
+
+class Entry(Quiet):
     """Slider and field of one number; the field takes what the slider does not reach."""
 
     def __init__(self, key: str, scene: Scene, change: Change) -> None:
@@ -98,19 +111,10 @@ class Entry:
             max_length=LONGEST,
         )  # fmt: skip
         named = f'<span class="name">{html.escape(label_of(self.row, key))}</span>'
-        self.label = Div(
-            text=f'{named} <span class="key">{key}</span>',
-            sizing_mode="stretch_width",
-            stylesheets=[WIDGETS],
-        )
-        self.note = Div(
-            name=f"{key} note",
-            text="",
-            visible=False,
-            sizing_mode="stretch_width",
-            stylesheets=[WIDGETS],
-        )
-        self._quiet = self.refused = False
+        wide: dict[str, Any] = {"sizing_mode": "stretch_width", "stylesheets": [WIDGETS]}
+        self.label = Div(text=f'{named} <span class="key">{key}</span>', **wide)
+        self.note = Div(name=f"{key} note", text="", visible=False, **wide)
+        self.refused = False
         self.slider.on_change("value", self._slid)
         self.field.on_change("value", self._typed)
         self.show_use(scene)
@@ -123,10 +127,7 @@ class Entry:
 
     def start(self, scene: Scene) -> None:
         """Take the value of a scene to start from."""
-        value = float(scene[self.key])
-        start, end, step = range_of(self.key, value)
-        self._set(self.slider, value, start=start, end=end, step=step)
-        self._set(self.field, short(value))
+        self._show(float(scene[self.key]))
         self._tell("")
         self.show_use(scene)
 
@@ -144,7 +145,7 @@ class Entry:
         if self._quiet:
             return
         value = float(f"{value:.{DIGITS}g}")
-        self._set(self.field, short(value))
+        self._set(self.field, value=short(value))
         self._tell(self.change(self.key, value))
 
     def _typed(self, _: str, __: Any, text: str) -> None:
@@ -159,19 +160,13 @@ class Entry:
             return
         refused = self.change(self.key, value)
         if not refused:
-            # as the scene has it: it may have been written with a unit
-            start, end, step = range_of(self.key, self.value)
-            self._set(self.slider, self.value, start=start, end=end, step=step)
-            self._set(self.field, short(self.value))
+            self._show(self.value)  # as the scene has it: it may have been written with a unit
         self._tell(refused)
 
-    def _set(self, widget: Any, value: Any, **more: Any) -> None:
-        """Change a widget without hearing of it."""
-        self._quiet = True
-        try:
-            widget.update(**more, value=value)
-        finally:
-            self._quiet = False
+    def _show(self, value: float) -> None:
+        start, end, step = range_of(self.key, value)
+        self._set(self.slider, start=start, end=end, step=step, value=value)
+        self._set(self.field, value=short(value))
 
     def _tell(self, refused: str) -> None:
         self.refused = bool(refused)
@@ -187,7 +182,7 @@ class Entry:
             self.note.update(text=shown, visible=bool(text))
 
 
-class Switch:
+class Switch(Quiet):
     """A switch or a choice of `effects`; what is refused goes back."""
 
     def __init__(self, key: str, scene: Scene, change: Change, tell: Callable[[str], None]) -> None:
@@ -205,14 +200,13 @@ class Switch:
                 sizing_mode="stretch_width", **more,
             )  # fmt: skip
             self.property = "value"
-        self._quiet = False
         self.widget.on_change(self.property, self._chosen)
         self.show_use(scene)
 
     def start(self, scene: Scene) -> None:
         """Take the value of a scene to start from."""
         self.kept = scene[self.key]
-        self._go_back()
+        self._set(self.widget, **{self.property: self.kept})
         self.show_use(scene)
 
     def show_use(self, scene: Scene) -> None:
@@ -227,16 +221,9 @@ class Switch:
         refused = self.change(self.key, value)
         self.tell(refused)
         if refused:
-            self._go_back()
+            self._set(self.widget, **{self.property: self.kept})
         else:
             self.kept = value
-
-    def _go_back(self) -> None:
-        self._quiet = True
-        try:
-            self.widget.update(**{self.property: self.kept})
-        finally:
-            self._quiet = False
 
 
 def keys_of(scene: Scene) -> Iterator[str]:

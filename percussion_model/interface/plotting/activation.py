@@ -89,8 +89,7 @@ def _edges(contacts: list[tuple[float, float]]) -> list[tuple[str, float]]:
 
 
 def _letter_edges(ax: Axes, contacts: list[tuple[float, float]]) -> None:
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.14 * (high - low))
+    style.room_above(ax, 0.14)
     for k, (letter, time) in enumerate(_edges(contacts)):
         ax.annotate(
             letter,
@@ -103,12 +102,6 @@ def _letter_edges(ax: Axes, contacts: list[tuple[float, float]]) -> None:
         )
 
 
-def _relative(window: Window) -> tuple[np.ndarray, np.ndarray]:
-    """u_r [m] and v_r [m/s]: mean piston motion relative to the bit."""
-    velocity = window.samples["piston_velocity"] - window.samples["bit_velocity"]
-    return window.samples["relative_displacement"], velocity
-
-
 def _around(window: Window, contact: tuple[float, float]) -> tuple[int, int]:
     """Samples just before and just after a contact, which may have no length."""
     first = int(np.searchsorted(window.time, contact[0], side="left")) - 1
@@ -117,34 +110,23 @@ def _around(window: Window, contact: tuple[float, float]) -> tuple[int, int]:
 
 
 def _relative_motion(ax: Axes, window: Window) -> None:
-    u, v = _relative(window)
-    _draw_relative(ax, window, u, v, np.ones(len(u), bool))
-    if window.scene.effects.drive == "pressure":
-        ax.axvline(
-            -window.scene.drive.reversal_distance * MM,
-            color=style.RULE_COLOUR,
-            linestyle=":",
-            linewidth=1.2,
-        )
-        ax.annotate(
-            "−D₁: drive turns down",
-            (-window.scene.drive.reversal_distance * MM, 0.97),
-            (-5, 0),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            ha="right",
-            va="top",
-        )
     title = "Relative mean motion over the whole blow" if window.is_blow else "Relative mean motion"
-    style.label(ax, "piston relative to bit, $u_r$ [mm]", "relative velocity, $v_r$ [m/s]", title)
+    _draw_relative(ax, window, np.ones(len(window.time), bool), title)
+    if window.scene.effects.drive == "pressure":
+        turn = -window.scene.drive.reversal_distance * MM
+        ax.axvline(turn, color=style.RULE_COLOUR, linestyle=":", linewidth=1.2)
+        ax.annotate(
+            "−D₁: drive turns down", (turn, 0.97), (-5, 0), xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points", ha="right", va="top",
+        )  # fmt: skip
 
 
 def _near_zero(ax: Axes, window: Window, contacts: list[tuple[float, float]]) -> None:
     """Zoom on the contacts: from the approach to just after the last one."""
-    u, v = _relative(window)
     last = max((end for _, end in contacts), default=window.activation_until)
     shown = window.time <= max(ZOOM_AFTER_CONTACT * last, window.time[1])
-    _draw_relative(ax, window, u, v, shown)
+    title = "The same near zero" + (": A, C closing, B, D parting" if len(contacts) == 2 else "")
+    u, v = _draw_relative(ax, window, shown, title)
     samples = [k for contact in contacts for k in _around(window, contact)]
     for (letter, _), k in zip(_edges(contacts), samples, strict=False):
         x, y = u[k] * MM, v[k]
@@ -154,14 +136,22 @@ def _near_zero(ax: Axes, window: Window, contacts: list[tuple[float, float]]) ->
         ax.annotate(letter, (x, y), off, textcoords="offset points", va=side, fontweight="bold")
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     ax.margins(0.08)
-    title = "The same near zero" + (": A, C closing, B, D parting" if len(contacts) == 2 else "")
-    style.label(ax, "piston relative to bit, $u_r$ [mm]", "relative velocity, $v_r$ [m/s]", title)
 
 
 def _draw_relative(
-    ax: Axes, window: Window, u: np.ndarray, v: np.ndarray, shown: np.ndarray
-) -> None:
-    """Draw the trajectory, thick where the piston is on the bit."""
+    ax: Axes, window: Window, shown: np.ndarray, title: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw mean piston motion relative to the bit, thick where the piston is on it.
+
+    Returns
+    -------
+    u_r : ndarray
+        Displacement [m].
+    v_r : ndarray
+        Velocity [m/s].
+    """
+    u = window.samples["relative_displacement"]
+    v = window.samples["piston_velocity"] - window.samples["bit_velocity"]
     ax.plot(u[shown] * MM, v[shown], color="black", linewidth=1.0)
     for contact in window.contacts:
         first, last = _around(window, contact)
@@ -169,3 +159,5 @@ def _draw_relative(
             break
         inside = slice(first, last + 1)
         ax.plot(u[inside] * MM, v[inside], color=style.CONTACT_COLOUR, linewidth=3.0, zorder=3)
+    style.label(ax, "piston relative to bit, $u_r$ [mm]", "relative velocity, $v_r$ [m/s]", title)
+    return u, v

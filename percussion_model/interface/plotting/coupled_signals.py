@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from percussion_model.coupling.coupled_run import CoupledRun
-from percussion_model.interface.plotting.style import STYLE, head, save_png
+from percussion_model.interface.plotting import style
 
 
 class Panel(NamedTuple):
@@ -46,8 +46,8 @@ MODES = ("drills", "in a void", "retracts")
 
 def save_signals(run: CoupledRun, path: Path, title: str) -> Path:
     """Draw what a drilling system has of the usual signals; return the PNG file."""
-    with rc_context(STYLE):
-        return save_png(draw_signals(run, title), path, dpi=110)
+    with rc_context(style.STYLE):
+        return style.save_png(draw_signals(run, title), path, dpi=110)
 
 
 def draw_signals(run: CoupledRun, title: str) -> Figure:
@@ -70,8 +70,7 @@ def draw_signals(run: CoupledRun, title: str) -> Figure:
             ax.set_ylim(-0.4, len(MODES) - 0.6)
         if any(panel.signals.values()):
             ax.legend(loc="upper right", ncols=2)
-            low, high = ax.get_ylim()
-            ax.set_ylim(low, high + ROOM_OF_LEGEND * (high - low))
+            style.room_above(ax, ROOM_OF_LEGEND)
     axes[-1, 0].set_xlabel("time [s]")
-    head(figure, f"{title}: signals of a coupled run")
+    style.head(figure, f"{title}: signals of a coupled run")
     return figure

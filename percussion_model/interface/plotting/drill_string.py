@@ -156,8 +156,7 @@ def _end_forces(ax: Axes, watched: WatchedBlow, count: int) -> None:
     ax.plot(time, first / KN, "--", color=style.PISTON_COLOUR, label="first cell of the shank")
     ax.plot(time, last / KN, color=style.BIT_COLOUR, label="last cell of the bit")
     ax.axhline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.3 * (high - low))
+    style.room_above(ax, 0.3)
     ax.legend(loc="upper right", ncols=2)
     style.label(ax, "time since the impact [ms]", "force [kN]")
 
@@ -240,8 +239,7 @@ def _peaks(ax: Axes, watched: WatchedBlow) -> None:
         ax.axvline(edges[0], color="black", linewidth=0.5, alpha=0.6)
     ax.axhline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     ax.set_xlim(min(offsets.values()), bottom)
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.2 * (high - low))
+    style.room_above(ax, 0.2)
     for name, offset in offsets.items():
         length = float(watched.edges[name][-1])
         if length > 0.1 * bottom:
@@ -291,8 +289,7 @@ def draw_gauges(report: StringReport) -> Figure:
         title = f"{bar_title(bar)}: {place:.3g} m below its top, {below:.3g} m below the struck end"
         style.label(ax, "", "stress [MPa]", title)
     panels[0].set_xlim(0.0, float(time[-1]) * MS)
-    low, high = panels[0].get_ylim()
-    panels[0].set_ylim(low, high + 0.2 * (high - low))
+    style.room_above(panels[0], 0.2)
     panels[-1].set_xlabel("time since the impact [ms]")
     handles = panels[0].get_legend_handles_labels()[0]
     style.head(fig, f"Stress at gauges on the string — {report.title}", handles)

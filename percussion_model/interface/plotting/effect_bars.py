@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
 from percussion_model.analysis.change import Change
 from percussion_model.analysis.effect_study import EffectsStudy
@@ -109,12 +109,7 @@ def _cost_panels(found: EffectsStudy) -> Iterator[Panel]:
         costs = [trial.numbers()[key] for trial in found.trials]
         values = [c / base[key] if c is not None and base[key] else None for c in costs]
         if any(value is not None for value in values):
-            yield partial(_cost_panel, values, title)
-
-
-def _cost_panel(values: list[float | None], title: str, ax: Axes) -> None:
-    _costs(ax, values)
-    style.label(ax, "times that of the scene", "", f"Cost of {title}")
+            yield partial(_costs, values, f"Cost of {title}")
 
 
 def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
@@ -122,21 +117,16 @@ def _change_panels(found: EffectsStudy) -> Iterator[Panel]:
     for key in found.changed:
         changes = [found.change(trial, key) for trial in found.trials]
         if any(change.value is not None for change in changes):
-            yield partial(_change_panel, changes, CHANGES[key])
+            yield partial(_changes, changes, CHANGES[key])
 
 
-def _change_panel(changes: list[Change], title: str, ax: Axes) -> None:
-    _changes(ax, changes)
-    style.label(ax, "change [%]", "", title)
-
-
-def _costs(ax: Axes, values: list[float | None]) -> None:
+def _costs(values: list[float | None], title: str, ax: Axes) -> None:
     """Bars from 1, on a logarithmic axis."""
     known = [value for value in values if value is not None]
     least, most = min([0.5, *known]), max([2.0, *known])
     ax.set_xscale("log")
     ax.set_xlim(least / 20.0, most * 9.0)
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_locator(NullLocator())
     for y, value in enumerate(values):
         if value is None:
@@ -147,9 +137,10 @@ def _costs(ax: Axes, values: list[float | None]) -> None:
         align = "left" if value >= 1.0 else "right"
         ax.text(value * side, y, in_digits(value, 2), va="center", ha=align, fontsize=8.0)
     ax.axvline(1.0, color=style.RULE_COLOUR, linewidth=0.8)
+    style.label(ax, "times that of the scene", "", title)
 
 
-def _changes(ax: Axes, changes: list[Change]) -> None:
+def _changes(changes: list[Change], title: str, ax: Axes) -> None:
     """Bars from 0 in per cent, with their errors, grey where they are not known."""
     shares = [None if one.value is None else 100.0 * one.value for one in changes]
     known = [
@@ -179,3 +170,4 @@ def _changes(ax: Axes, changes: list[Change]) -> None:
         align = "left" if (share >= 0.0) == has_room else "right"
         ax.text(shown if has_room else 0.0, y, text, va="center", ha=align, fontsize=8.0)
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.8)
+    style.label(ax, "change [%]", "", title)

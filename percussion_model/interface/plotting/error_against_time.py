@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -94,14 +94,14 @@ def _drawn(found: Study) -> list[str]:
 
 
 def _panel(ax: Axes, found: Study, key: str) -> None:
-    names = [name for name in _drawn(found) if _points(found, name, key)]
+    names = [name for name in _drawn(found) if _pairs(found, found.ladder(name), key)]
     for name in names:
         _ladder(ax, found, name, key)
     floor = found.reference.floor(key)
     known = math.isfinite(floor) and found.kind != APERIODIC
     if known:
         ax.axhspan(LEAST / 10.0, max(floor, LEAST), color=style.SHADE_COLOUR, linewidth=0, zorder=0)
-    errors = [error for name in names for _, error in _points(found, name, key)]
+    errors = [error for name in names for _, error in _pairs(found, found.ladder(name), key)]
     if errors:
         bottom = min([*errors, floor if known and floor > LEAST else math.inf])
         ax.set_ylim(0.5 * bottom, 2.0 * max(errors))
@@ -133,7 +133,7 @@ def _log_axes(ax: Axes) -> None:
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(LogLocator(10.0, numticks=12))
         axis.set_minor_locator(NullLocator())  # hundreds of ticks take most of the drawing
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g}"))
 
 
@@ -142,22 +142,16 @@ def _cost(found: Study, point: Point) -> float:
     return found.seconds(point) * (found.duration if found.kind == DROP else 1.0)
 
 
-def _points(found: Study, name: str, key: str) -> list[tuple[float, float]]:
-    """Time and error, as drawn, of each point of a ladder that has both."""
-    return list(_pairs(found, found.ladder(name), key))
-
-
-def _pairs(found: Study, points: Iterable[Point], key: str) -> Iterable[tuple[float, float]]:
-    for point in points:
-        error, cost = point.errors.get(key, math.nan), _cost(found, point)
-        if cost > 0 and math.isfinite(error):
-            yield cost, max(error, LEAST)
+def _pairs(found: Study, points: Iterable[Point], key: str) -> list[tuple[float, float]]:
+    """Time and error, as drawn, of each point that has both."""
+    pairs = ((_cost(found, point), point.errors.get(key, math.nan)) for point in points)
+    return [(cost, max(error, LEAST)) for cost, error in pairs if cost > 0 and math.isfinite(error)]
 
 
 def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
     """Line through all points; hollow markers where an order does not count them."""
     colour, dashes, marker = LINES[name]
-    x, y = np.array(_points(found, name, key)).T
+    x, y = np.array(_pairs(found, found.ladder(name), key)).T
     is_own = name == found.own
     width, size = (OWN_WIDTH, OWN_SIZE) if is_own else (WIDTH, SIZE)
     ax.plot(x, y, color=colour, linestyle=dashes, linewidth=width, zorder=4 if is_own else 2)
@@ -165,7 +159,7 @@ def _ladder(ax: Axes, found: Study, name: str, key: str) -> None:
     full = [point for point in found.ladder(name) if point.label in fitted]
     rest = [point for point in found.ladder(name) if point.label not in fitted]
     for points, face in ((full, colour), (rest, "white")):
-        pairs = list(_pairs(found, points, key))
+        pairs = _pairs(found, points, key)
         if pairs:
             x, y = np.array(pairs).T
             ax.plot(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -58,17 +58,16 @@ def source(**columns: Any) -> ColumnDataSource:
 def line(to: Any, x: np.ndarray, y: np.ndarray, colour: str, **more: Any) -> Any:
     """Draw a line, thinned so that each rise and fall is kept."""
     kept = thinned(y)
-    drawn = to.line("x", "y", source=source(x=x[kept], y=y[kept]), color=colour,
-                    line_width=1.6, **more)  # fmt: skip
-    return drawn
+    columns = source(x=x[kept], y=y[kept])
+    return to.line("x", "y", source=columns, color=colour, line_width=1.6, **more)
 
 
-def thinned(values: np.ndarray, most: int = MOST_POINTS) -> np.ndarray:
-    """Indices of at most so many values: in each stretch the first, least and greatest."""
+def thinned(values: np.ndarray) -> np.ndarray:
+    """Indices of at most `MOST_POINTS` values: in each stretch the first, least and greatest."""
     count = len(values)
-    if count <= most:
+    if count <= MOST_POINTS:
         return np.arange(count)
-    edges = np.linspace(0, count, most // 3 + 1).astype(int)
+    edges = np.linspace(0, count, MOST_POINTS // 3 + 1).astype(int)
     kept = [0, count - 1]
     for start, end in pairwise(edges):
         part = values[start:end]
@@ -109,19 +108,19 @@ def legend(to: Any, place: str = "above") -> None:
         to.add_layout(made, place)
 
 
-def embedded(figures: Sequence[LayoutDOM]) -> tuple[list[str], str]:
+def embedded(figures: Mapping[str, LayoutDOM]) -> tuple[dict[str, str], str]:
     """Return a place for each figure, and the scripts that fill them without any network.
 
     Returns
     -------
-    places : list of str
-        HTML, one for each figure.
+    places : dict of str
+        HTML, by the names of the figures.
     scripts : str
         HTML, the library among it.
     """
     needed = ["bokeh"]
-    if any(made.select({"type": Widget}) for made in figures):
+    if any(made.select({"type": Widget}) for made in figures.values()):
         needed += ["bokeh-widgets", "bokeh-tables"]
     resources = Resources(mode="inline", components=needed)
-    script, places = components(tuple(figures))
-    return list(places), resources.render() + script
+    script, places = components(dict(figures))
+    return places, resources.render() + script

@@ -155,7 +155,7 @@ def _table(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
             TableColumn(field=f"at{k}", title=title, formatter=in_column(GIVEN), width=WIDE)
         )
     shown.append(TableColumn(field="kind", title="motion", width=NARROW))
-    data["verdict"] = _verdicts(found.undecided[kept])
+    data["verdict"] = np.where(found.undecided[kept], UNDECIDED, "").tolist()
     shown.append(TableColumn(field="verdict", title="rate is", width=NARROW))
     for name, title in _titles().items():
         data[name] = columns[name][kept]
@@ -195,11 +195,6 @@ def _rates(found: Study, kept: np.ndarray) -> list[str]:
         else found.rate_text(k, "")
         for k in kept.tolist()
     ]
-
-
-def _verdicts(undecided: np.ndarray) -> list[str]:
-    """A word for what must not be read as a rate."""
-    return [UNDECIDED if hidden else "" for hidden in undecided.tolist()]
 
 
 def _label(key: str, unit: str) -> str:
@@ -410,7 +405,7 @@ def _cells(
             "value": _seen(columns["rate"], undecided)[at],
             "grey": undecided[at].astype(np.float32),
             "rate_text": [texts[k] for k in at.tolist()],
-            "verdict": _verdicts(undecided[at]),
+            "verdict": np.where(undecided[at], UNDECIDED, "").tolist(),
             "motion": [KINDS[kind] for kind in kinds[at].tolist()],
             "mark": np.where(kinds[at] == KINDS.index("periodic"), 0.0, 6.0),
         },

@@ -37,7 +37,10 @@ def draw_motion(window: Window) -> Figure:
     if has_zoom:
         _settled_force(axes[1, 0], window)
     _phase_portrait(axes[2, 0], window)
-    _force_penetration(axes[2, 1], window)
+    ax = axes[2, 1]
+    force_over(ax, window, window.since_start("bit_end_position"))
+    place = "displacement of the bit's rock end [mm]"
+    style.label(ax, place, "bit force [kN]", "Force against penetration")
     handles: list[object] = list(style.mode_handles(window.samples["drilling_mode"]))
     if window.contacts:
         handles.append(style.contact_handle())
@@ -92,15 +95,12 @@ def _phase_portrait(ax: Axes, window: Window) -> None:
     )
 
 
-def _force_penetration(ax: Axes, window: Window) -> None:
+def force_over(ax: Axes, window: Window, x: np.ndarray) -> None:
+    """Draw the force over a length [m], in the range where there is one."""
     inside = window.time >= 0.0
-    x = window.since_start("bit_end_position")[inside] * MM
-    mode = window.samples["drilling_mode"][inside]
+    x, mode = x[inside] * MM, window.samples["drilling_mode"][inside]
     style.draw_by_mode(ax, x, window.samples["bit_force"][inside] / KN, mode)
     touching = x[mode != Mode.FF]
     if len(touching) and np.ptp(touching) > 0:
         room = 0.05 * np.ptp(touching)  # free flight has no force: it may leave the picture
         ax.set_xlim(touching.min() - room, touching.max() + room)
-    style.label(
-        ax, "displacement of the bit's rock end [mm]", "bit force [kN]", "Force against penetration"
-    )

@@ -83,10 +83,9 @@ def _mean(ax: Axes, result: Result) -> None:
     ax.legend(loc="best")
 
 
-def _marks(count: int) -> dict[str, Any]:
-    if count > MOST_MARKERS:
-        return {"linewidth": 0.9}
-    return {"marker": "o", "markersize": 2.6, "linewidth": 0.9}
+def _marks(count: int, marker: str = "o", size: float = 2.6) -> dict[str, Any]:
+    shown = {"marker": marker, "markersize": size} if count <= MOST_MARKERS else {}
+    return {"linewidth": 0.9, **shown}
 
 
 def _series(ax: Axes, time: np.ndarray, values: np.ndarray, unit: str, title: str) -> None:
@@ -113,15 +112,8 @@ def _counts(ax: Axes, blows: np.ndarray) -> None:
         ("drilling_cycles", style.BIT_COLOUR, "s", "drilling cycles"),
         ("contacts", style.PISTON_COLOUR, "o", "piston/bit contacts"),
     ):
-        ax.plot(
-            blows["time"],
-            blows[field],
-            color=colour,
-            label=name,
-            linewidth=0.9,
-            marker=marker if len(blows) <= MOST_MARKERS else "",
-            markersize=2.0,
-        )
+        marks = _marks(len(blows), marker, 2.0)
+        ax.plot(blows["time"], blows[field], color=colour, label=name, **marks)
     high = max(int(blows[f].max()) for f in ("drilling_cycles", "contacts"))
     ax.set_ylim(-0.2, 1.35 * high + 0.5)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))

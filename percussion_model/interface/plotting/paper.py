@@ -139,6 +139,31 @@ def _fit(ax: Axes, x: np.ndarray, y: np.ndarray, words: str, at: tuple[float, fl
     ax.annotate(words, at, xycoords="axes fraction", va="top")
 
 
+def _power_fit(
+    ax: Axes, found: Study, unit: float, least: float, law: tuple[str, str], at: tuple[float, float]
+) -> None:
+    """Draw the points, and the power law through those from `least` on.
+
+    Parameters
+    ----------
+    unit : float
+        Factor from SI to what the axis says.
+    law : tuple of str
+        Symbol, and the exponent of the paper.
+    at : tuple of float
+        Where they stand in the panel.
+    """
+    _points(ax, found, unit)
+    x, rate, _ = along(found)
+    x, rate = x[x >= least], rate[x >= least]
+    exponent, factor = power_law(x, rate)
+    _, error = exponent_and_error(x, rate)
+    symbol, known = law
+    words = f"$\\sim {symbol}^{{{_fitted(exponent, error)}}}$ (paper: {known})"
+    _fit(ax, x * unit, factor * x**exponent, words, at)
+    ax.set_xscale("log")
+
+
 def _fitted(value: float, error: float) -> str:
     """What the statements say of a fit, within a formula."""
     return fit_text(value, error).replace("±", "\\pm").replace(" ", "\\ ")
@@ -148,13 +173,7 @@ RATE = "rate of penetration [mm/s]"
 
 
 def _stiffness(ax: Axes, found: Study) -> None:
-    _points(ax, found, 1e-6)
-    x, rate, _ = along(found)
-    exponent, factor = power_law(x, rate)
-    _, error = exponent_and_error(x, rate)
-    words = f"$\\sim K_R^{{{_fitted(exponent, error)}}}$ (paper: −0.55)"
-    _fit(ax, x * 1e-6, factor * x**exponent, words, (0.35, 0.8))
-    ax.set_xscale("log")
+    _power_fit(ax, found, 1e-6, 0.0, ("K_R", "−0.55"), (0.35, 0.8))
     style.label(ax, "loading stiffness $K_R$ [kN/mm]", RATE, "(a) Loading stiffness of the rock")
 
 
@@ -196,15 +215,8 @@ def _feed(ax: Axes, found: Study) -> None:
 
 
 def _distance(ax: Axes, found: Study) -> None:
-    _points(ax, found, MM)
-    x, rate, _ = along(found)
-    above = x >= PAPER_LEAST_DISTANCE
-    exponent, factor = power_law(x[above], rate[above])
-    _, error = exponent_and_error(x[above], rate[above])
-    words = f"$\\sim D_1^{{{_fitted(exponent, error)}}}$ (paper: −0.36)"
-    _fit(ax, x[above] * MM, factor * x[above] ** exponent, words, (0.5, 0.75))
+    _power_fit(ax, found, MM, PAPER_LEAST_DISTANCE, ("D_1", "−0.36"), (0.5, 0.75))
     _paper_limit(ax, PAPER_LEAST_DISTANCE * MM)
-    ax.set_xscale("log")
     style.label(ax, "reversal distance $D_1$ [mm]", RATE, "(d) Frequency, at constant power")
 
 

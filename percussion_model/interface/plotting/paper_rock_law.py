@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from percussion_model.interface.plotting import style
+from percussion_model.interface.plotting.motion import force_over
 from percussion_model.interface.plotting.style import KN, MM, MS
 from percussion_model.interface.plotting.window import ROOM_AFTER, Window
 from percussion_model.physics.records import Mode
@@ -61,24 +62,13 @@ def draw_force(window: Window) -> Figure:
             "(4b) Over penetration: one line of loading",
         ),
     ):
-        _force_over(ax, window, x)
+        force_over(ax, window, x)
         style.label(ax, name, "bit force [kN]", title)
     _say_jump(axes[1, 0], window, end - law)
     _datum(axes[1, 1], window, end - law)
     title = f"Force of the rock through a blow (figures 4 and 7) — {window.name}"
     style.head(fig, title, style.mode_handles(window.samples["drilling_mode"]))
     return fig
-
-
-def _force_over(ax: Axes, window: Window, x: np.ndarray) -> None:
-    """Draw the force over a length, in the range where there is one."""
-    inside = window.time >= 0.0
-    mode = window.samples["drilling_mode"][inside]
-    x = x[inside] * MM
-    style.draw_by_mode(ax, x, window.samples["bit_force"][inside] / KN, mode)
-    touching = x[mode != Mode.FF]
-    room = 0.05 * np.ptp(touching)
-    ax.set_xlim(touching.min() - room, touching.max() + room)
 
 
 def _say_jump(ax: Axes, window: Window, datum: np.ndarray) -> None:

@@ -25,10 +25,9 @@ function shown(value, digits) {{
 """
 
 
-def in_hover(digits: int, name: str | None = None) -> CustomJSHover:
+def in_hover(digits: int) -> CustomJSHover:
     """Show a number beside the pointer with so many digits."""
-    return CustomJSHover(args={"digits": digits}, code=f"{_SHOWN} return shown(value, digits);",
-                         name=name)  # fmt: skip
+    return CustomJSHover(args={"digits": digits}, code=f"{_SHOWN} return shown(value, digits);")
 
 
 def of_choice(choice: Model, digits: Mapping[str, int], name: str | None = None) -> CustomJSHover:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -65,16 +67,12 @@ def _beside(ax: Axes, depth: float, text: str, rotation: float = 0.0) -> None:
 def _mark_contacts(ax: Axes, window: Window, depth: float, end: float) -> None:
     """Draw the border of piston and bit, thick where they touch."""
     ax.axhline(depth * MM, color="black", linewidth=0.8, linestyle=(0, (1, 2)))
+    closed: dict[str, Any] = {"color": "black", "linewidth": 2.6}
     for start, stop in window.contacts:
         if start < end:
-            ax.plot(
-                [start * US, min(stop, end) * US],
-                [depth * MM] * 2,
-                color="black",
-                linewidth=2.6,
-                solid_capstyle="butt",
-            )
-    ax.plot([], [], color="black", linewidth=2.6, label="piston on bit")
+            times = [start * US, min(stop, end) * US]
+            ax.plot(times, [depth * MM] * 2, solid_capstyle="butt", **closed)
+    ax.plot([], [], label="piston on bit", **closed)
     ax.plot([], [], color="black", linewidth=0.8, linestyle=(0, (1, 2)), label="gap open")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
 
@@ -89,7 +87,6 @@ def _end_forces(ax: Axes, window: Window, end: float, has_contact: bool) -> None
     ax.plot(
         time, window.samples["bit_force"][shown] / KN, color=style.BIT_COLOUR, label="bit on rock"
     )
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.3 * (high - low))
+    style.room_above(ax, 0.3)
     ax.legend(loc="upper right", ncols=2)
     style.label(ax, "time [µs]", "force [kN]")

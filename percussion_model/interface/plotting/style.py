@@ -152,6 +152,12 @@ def shade_contacts(ax: Axes, contacts: Sequence[tuple[float, float]], scale: flo
             ax.axvline(start * scale, color=SHADE_COLOUR, linewidth=2.5, zorder=0)
 
 
+def room_above(ax: Axes, share: float) -> None:
+    """Leave room above what is drawn, for words; a share of its range."""
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + share * (high - low))
+
+
 def head(fig: Figure, title: str, handles: Sequence[Any] = ()) -> None:
     """Write the figure's title and, below it, one legend for all panels."""
     fig.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
@@ -199,24 +205,16 @@ def save_figures(
     folder = Path(folder)
     files: list[str] = []
     with staged(folder) as draft, rc_context(STYLE):
-        for name, fig in _each_told(draw(), names, report):
-            files += save(fig, draft, name, kinds, dpi)
+        drawn, count = iter(draw()), len(names)
+        for k in itertools.count():
+            if report is not None and k < count:
+                # no share of the time: one may take ten times as long as another
+                report(f"drawing figure {k + 1} of {count}, {names[k]}", None)
+            one = next(drawn, None)
+            if one is None:
+                break
+            files += save(one[1], draft, one[0], kinds, dpi)
     return [folder / name for name in files]
-
-
-def _each_told(
-    drawn: Iterable[tuple[str, Figure]], names: Sequence[str], report: Report | None
-) -> Iterator[tuple[str, Figure]]:
-    """Go through figures, and say which it is before each of them is drawn."""
-    waiting, count = iter(drawn), len(names)
-    for k in itertools.count():
-        if report is not None and k < count:
-            # no share of the time: one may take ten times as long as another
-            report(f"drawing figure {k + 1} of {count}, {names[k]}", None)
-        one = next(waiting, None)
-        if one is None:
-            return
-        yield one
 
 
 def save(

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MPA, US
@@ -22,7 +22,6 @@ from percussion_model.verification.measured import (
     Row,
 )
 from percussion_model.verification.measured.blow import (
-    Blow,
     Reading,
     Rig,
     at_speed,
@@ -55,6 +54,10 @@ DASHES = ("-", (0, (4.0, 2.0)), ":")
 SAMPLES = 400
 
 
+# A fit, and a speed that it is shown at.
+Line = tuple[FoundFit, float | None]
+
+
 def draw_all(found: Comparison) -> Iterator[tuple[str, Figure]]:
     """Draw a figure for each experiment, by its name."""
     for one in found.experiments:
@@ -80,23 +83,25 @@ def draw_experiment(found: Comparison, one: Experiment) -> Figure:
         _force_in_time(third, found, rig, lines)
     _deviations(axes[1, 1], rows)
     handles = [
-        Line2D([], [], color="black", marker="o", linestyle="", markersize=5.0,
-               label="measured, or computed by others, with its error"),
+        _marker("black", "measured, or computed by others, with its error", "o"),
         Patch(facecolor=style.SHADE_COLOUR, label="within the criterion"),
-    ]  # fmt: skip
+    ]
     if any(row.within is None and row.quantity == "peak_force" for row in rows):
-        handles.append(
-            Line2D([], [], color="black", marker="o", linestyle="", markersize=5.0,
-                   markerfacecolor="white", label="without a criterion")
-        )  # fmt: skip
-    colours = {row.verdict for row in rows}
+        handles.append(_marker("black", "without a criterion", "o", hollow=True))
+    verdicts = {row.verdict for row in rows}
     handles += [
-        Line2D([], [], color=colour, marker="D", linestyle="", markersize=5.0,
-               markerfacecolor="white" if word == FITTED else colour, label=word)
-        for word, colour in VERDICT_COLOURS.items() if word in colours and word != NO_CRITERION
-    ]  # fmt: skip
+        _marker(colour, word, "D", hollow=word == FITTED)
+        for word, colour in VERDICT_COLOURS.items()
+        if word in verdicts and word != NO_CRITERION
+    ]
     style.head(fig, f"{one.title}: published numbers and this model", handles)
     return fig
+
+
+def _marker(colour: str, words: str, marker: str, hollow: bool = False) -> Line2D:
+    face = "white" if hollow else colour
+    return Line2D([], [], color=colour, marker=marker, linestyle="", markersize=5.0,
+                  markerfacecolor=face, label=words)  # fmt: skip
 
 
 def _speeds(found: Comparison, fit: FoundFit) -> list[float | None]:
@@ -116,9 +121,7 @@ def _drawn(found: Comparison, one: Experiment) -> list[FoundFit]:
     return [fit for _, fit in best.values()]
 
 
-def _named(
-    lines: list[tuple[FoundFit, float | None]],
-) -> Iterator[tuple[FoundFit, float | None, dict[str, Any]]]:
+def _named(lines: list[Line]) -> Iterator[tuple[FoundFit, float | None, dict[str, Any]]]:
     """Fits and speeds with the look of their lines: a colour a speed, dashes a law."""
     speeds = list(dict.fromkeys(speed for _, speed in lines))
     laws = list(dict.fromkeys(fit.law for fit, _ in lines))
@@ -131,7 +134,7 @@ def _named(
         yield fit, speed, look
 
 
-def _legend(ax: Axes, lines: list[tuple[FoundFit, float | None]]) -> None:
+def _legend(ax: Axes, lines: list[Line]) -> None:
     """Say which colour is which speed, and which dashes are which law."""
     speeds, laws = {}, {}
     several = len({speed for _, speed in lines}) > 1
@@ -144,12 +147,11 @@ def _legend(ax: Axes, lines: list[tuple[FoundFit, float | None]]) -> None:
     ax.legend(handles.values(), handles.keys(), loc="best")
 
 
-def _displacements(
-    ax: Axes, found: Comparison, rig: Rig, lines: list[tuple[FoundFit, float | None]]
-) -> None:
+def _displacements(ax: Axes, found: Comparison, rig: Rig, lines: list[Line]) -> None:
     for fit, speed, look in _named(lines):
         blow = rig.blow(fit.scene, speed)
-        shown = slice(0, _until(blow, rig.reading))
+        # until the piston strikes the bit again
+        shown = slice(0, rebound(blow, rig.reading)[0].stop or len(blow.time))
         ax.plot(blow.time[shown] * US, blow.end[shown] * MM, **look)
         ax.plot(blow.time[shown] * US, blow.mean[shown] * MM, linewidth=0.7, **look)
         at = blow.time[deepest(blow)] * US
@@ -163,30 +165,18 @@ def _displacements(
     style.label(ax, "time [µs]", "down [mm]", title)
 
 
-def _until(blow: Blow, how: Reading) -> int:
-    """Samples until the piston strikes the bit again."""
-    flight = rebound(blow, how)[0]
-    return flight.stop or len(blow.time)
-
-
-def _forces(
-    ax: Axes, found: Comparison, rig: Rig, lines: list[tuple[FoundFit, float | None]]
-) -> None:
+def _forces(ax: Axes, found: Comparison, rig: Rig, lines: list[Line]) -> None:
     for fit, speed, look in _named(lines):
         blow = rig.blow(fit.scene, speed)
         touched = blow.force > 0.0
         ax.plot(blow.end[touched] * MM, blow.force[touched] / KN, **look)
         depths = _rows(found, fit, speed, "penetration")
-        for row in _rows(found, fit, speed, "peak_force"):
-            if not depths:
-                continue
+        for row in _rows(found, fit, speed, "peak_force") if depths else ():
             _measured(ax, depths[0].measured * MM, row.measured / KN, row.error / KN, look["color"])
     style.label(ax, "penetration [mm]", "force on the rock [kN]", "Force over penetration")
 
 
-def _force_in_time(
-    ax: Axes, found: Comparison, rig: Rig, lines: list[tuple[FoundFit, float | None]]
-) -> None:
+def _force_in_time(ax: Axes, found: Comparison, rig: Rig, lines: list[Line]) -> None:
     for fit, speed, look in _named(lines):
         blow = rig.blow(fit.scene, speed)
         ax.plot(blow.time * US, blow.force / KN, **look)
@@ -231,7 +221,7 @@ def _restitution(ax: Axes, found: Comparison, one: Experiment, rig: Rig) -> None
         words = f"at {speed:g} m/s: {row.measured:.3g}, which needs $\\gamma$ = {needed:.2g}"
         ax.errorbar([needed], [row.measured], yerr=[row.error], fmt="o", color=colour,
                     markersize=6.0, markeredgecolor="black", zorder=5, label=words)  # fmt: skip
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_xticks([1.5, 2, 3, 5, 10, 20, 40])
     ax.set_ylim(0.0, 1.0)
