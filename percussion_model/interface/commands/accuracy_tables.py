@@ -148,29 +148,14 @@ def _show_points(found: Study) -> None:
             errors = [_error(found, point, key) for key in keys]
             spread = two(100 * point.spread) if isfinite(point.spread) else "-"
             times = [two(1e3 * point.second), spread, two(1e3 * point.setup)]
-<<<<<<< HEAD
             table.add_row(f" {point.label}", *times, *errors)
-    _print(f"{what}; ms to compute a simulated second; ms of set-up", table, console)
-    console.print(
-=======
-            table.add_row(f" {label}", *times, *errors)
     _print(f"{what}; ms to compute a simulated second; ms of set-up", table)
     _say(
->>>>>>> L1-now
         f"A blow takes {found.period:.4g} s; its cost is that part of ms/s. ± is half the range of "
         "repeated times; what has none, and every set-up, was timed once."
     )
     if any(found.floor(key) for key in keys):
-<<<<<<< HEAD
-        console.print("< Below the bar of the reference, which tells no more.", highlight=False)
-=======
         _say("< Below the bar of the reference, which tells no more.")
-    if any(point.fit > FITS for point in found.points):
-        _say(
-            "* Lengths that fit no common cell: the wave speed is off, and the setting is not in "
-            "the order of its method."
-        )
->>>>>>> L1-now
 
 
 def _show_orders(found: Study) -> None:
