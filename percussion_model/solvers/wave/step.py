@@ -54,6 +54,8 @@ KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(ro
 CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES, VISCOUS = (int(row) for row in Has)
 # A part of a step shorter than this is not worth a step of its own.
 SHORTEST_PART = 1e-3
+# A contact that is left with no more than this share of its force has opened: it is rounding.
+ROUNDING = 1e-14
 # Mean motion is derived anew from waves and gap so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
@@ -280,8 +282,8 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     v_p, v_t, yields = free_ends(par, s, chain, waves, push)
     before = par.lag * s.g_contact
     approach, was, opened, t_close = v_p - v_t - yields * before, s.closed, 0, -1.0
-    if was == 1 and approach <= 0.0:
-        s.closed, opened = 0, 1
+    if was == 1 and approach <= ROUNDING * yields * s.g_contact:
+        s.closed, opened, approach = 0, 1, min(approach, 0.0)
     touches = s.closed == 1
     if s.closed == 0:
         if approach > 0.0 and s.gap < approach * tau:
