@@ -49,9 +49,7 @@ def test_pressure_law_over_a_bit_held_still():
 # ------------------------------------------------------------------ oracle 9: drop test
 
 
-@pytest.mark.parametrize(
-    ("solver", "leaps"), [("wave", True), ("modal", True), ("modal", False)]
-)
+@pytest.mark.parametrize(("solver", "leaps"), [("wave", True), ("modal", True), ("modal", False)])
 def test_drop_of_the_bit(solver, leaps):
     scene = Scene().replace(
         **{
