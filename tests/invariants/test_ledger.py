@@ -44,7 +44,6 @@ LEVELS = {
     "gravity": (True, False),
     "feed": (True, False),
     "tension": ("release", "paper"),
-    "leaps": (True, False),
     "cells": (10, 20, 150),
 }
 
@@ -62,7 +61,6 @@ def build(choice):
         "effects.gravity": choice["gravity"],
         "effects.feed": choice["feed"],
         "effects.standstill_tension": choice["tension"],
-        "solver.leaps": choice["leaps"],
         "solver.cells": choice["cells"],
         "fem.elements": choice["cells"],
         "run.settle": 0.0,
@@ -190,7 +188,7 @@ def test_every_pair_is_there():
 def test_conservation(choice):
     scene = build(choice)
     assert scene is not None
-    # at least every case meets a blow; a fine grid without loss or leaps is slow
+    # at least every case meets a blow; a fine grid is slow
     end = DURATION if choice["cells"] < 100 and choice["lengths"] != "one cell" else 0.015
     simulation = Simulation(scene)
     times = np.concatenate([np.linspace(0.0, 6e-4, 301), np.linspace(6e-4, end, 301)])

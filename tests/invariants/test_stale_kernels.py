@@ -20,8 +20,8 @@ from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE, Mesh, Node,
 from percussion_model.solvers.fem.scheme import load
 from percussion_model.solvers.rigid.forces import contact_force
 from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE
-from percussion_model.solvers.wave.leaps.dormant import mean_motion
-from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE, Coef, Row
+from percussion_model.solvers.wave.piston import move_piston
+from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 
 def records(par, state):
     par, state = np.zeros(1, par), np.zeros(1, state)

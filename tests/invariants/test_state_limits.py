@@ -16,7 +16,6 @@ RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 WAVES = Scene().computed_by("wave")
 SCENES = {
     "wave": WAVES,
-    "wave without leaps": WAVES.replace(**{"solver.leaps": False}),
     "wave, rigid piston": WAVES.replace(**{"piston.model": "rigid"}),
     "modal": Scene().computed_by("modal"),
     "fem": Scene().computed_by("fem"),
@@ -68,7 +67,7 @@ def test_no_whole_number_is_without_limits(runs, name):
 
 
 # Steps of the waves, which have their own test.
-STEPS = ("step", "leap_end", "no_plan", "piston_step", "wake", "no_dormancy")
+STEPS = ("step",)
 # Ticks, sets and counts of modes of the modal solver, of which tests/test_modal.py has a test.
 OF_MODES = (
     *("time", "look", "piston_time", "no_park", "closed_at", "rest_until"),
@@ -124,23 +123,11 @@ def test_the_workspace_is_finite(runs, name):
                 run.restore(replace(good, state=state))
 
 
-@pytest.mark.parametrize("name", ["wave", "wave without leaps", "wave, rigid piston"])
-def test_leaps_and_a_waiting_piston_stay_within_the_operators(runs, name):
+@pytest.mark.parametrize("name", ["wave", "wave, rigid piston"])
+def test_steps_of_waves_fit_the_time(runs, name):
     run, good = runs[name]
-    s = good.state.record[0]
-    step = int(s["step"])
-    longest = 4 ** int(run.solver._par[0]["leaps"]) - 1
-    for changes in (
-        {"leap_end": step, "leap_kind": 0},
-        {"leap_end": step + longest + 1, "leap_kind": 0},
-        {"leap_end": step + 65, "leap_kind": 2},  # contact sees 64 steps
-        {"dormant": 1, "piston_step": step + 1, "wake": step + 8},
-        {"dormant": 1, "piston_step": step, "wake": step + longest + 1},
-        {"dormant": 1, "piston_step": step - longest - 1, "wake": step + 1},
-        {"dormant": 1, "piston_step": 0, "wake": 2**50},
-        {"step": step + 10**13},
-        {"step": max(0, step - 10**4), "leap_end": -1, "dormant": 0},
-    ):
+    step = int(good.state.record[0]["step"])
+    for changes in ({"step": step + 10**13}, {"step": step - 10**4}, {"cuts": 3}, {"cuts": -1}):
         assert refused(run, good, **changes), changes
 
 
