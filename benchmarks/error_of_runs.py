@@ -17,6 +17,7 @@ import numpy as np
 
 from percussion_model import Scene, SceneError, Simulation
 from percussion_model.solvers.base import Solver, make_solver
+from percussion_model.solvers.wave.resolution import STEPS_OF_TWO
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.problems import PERIODIC, RATE, Run, pose
 
@@ -33,10 +34,9 @@ MOST_APART, GROSS = 3e-3, 1e-2
 Way = Callable[[Scene], Solver]
 
 
-def waves(cells: int, leaps: bool = True) -> Way:
-    """Waves with so many cells in the piston."""
-    changes = {"solver.cells": cells, "solver.leaps": leaps}
-    return lambda scene: make_solver(scene.computed_by("wave", **changes))
+def waves(steps: int) -> Way:
+    """Waves that cross the piston in so many steps."""
+    return lambda scene: make_solver(scene.computed_by("wave", **{"solver.cells": steps}))
 
 
 def explicit(elements: int) -> Way:
@@ -45,9 +45,8 @@ def explicit(elements: int) -> Way:
 
 
 METHODS: dict[str, Way] = {
-    "wave, 20 cells": waves(20),
-    "wave, 40 cells": waves(40),
-    "wave without leaps, 20 cells": waves(20, False),
+    f"wave, {STEPS_OF_TWO} steps": waves(STEPS_OF_TWO),
+    "wave, 40 steps": waves(40),
     "explicit, 20 elements": explicit(20),
     "explicit, 40 elements": explicit(40),
 }

@@ -22,7 +22,6 @@ from percussion_model.interface.commands.accuracy_tables import (
     within_bar,
 )
 from percussion_model.simulation.uncertain import in_digits
-from percussion_model.solvers.wave.resolution import STEPS_OF_TWO
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.advantage import (
     UNDECIDED,
@@ -337,20 +336,6 @@ def points_map() -> str:
     )
 
 
-def usual() -> str:
-    """What the steps that waves take unless told are worth."""
-    tree, label = load("map"), f"{STEPS_OF_TWO} steps"
-    row = next(row for row in tree["rows"] if row["method"] == f"wave, {label}")
-    study = load_studies(("reference",))["reference"]
-    point = next(p for p in study.ladder("wave") if p.label == label)
-    return (
-        f"Waves with {label} in the piston, their default, are off by "
-        f"{power(point.errors[RATE])} in the reference scene; over the {row['points']} points of "
-        f"the map of section 6 the median is {power(row['median'])}, the greatest "
-        f"{power(row['greatest'])}."
-    )
-
-
 def closed() -> str:
     """Errors at closed forms."""
     tree = load("closed_forms")
@@ -489,7 +474,6 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "forces": force_table,
     "coupled": coupled,
     "map": points_map,
-    "usual": wrapped(usual),
     "closed": closed,
     "steps": steps,
     "orders": reference_orders,

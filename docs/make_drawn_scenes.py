@@ -23,8 +23,8 @@ STIFFNESS = 1e8, 2e9  # N/m
 UNLOADING = 2.0, 40.0
 FEED = 500.0, 20e3  # N
 REVERSAL = 0.01, 0.08  # m
-# Cells by which the motion is judged, and how fast a disturbance must shrink from blow to blow.
-CELLS, SHRINKING = 40, 0.5
+# Modes by which the motion is judged, and how fast a disturbance must shrink from blow to blow.
+MODES, SHRINKING = 40, 0.5
 RUN = {"run.duration": 2.0, "run.settle": 0.6}  # s
 TEXT = """\
 # Drawn with seed {seed} by docs/make_drawn_scenes.py; all else is as in the reference.
@@ -80,12 +80,10 @@ def drawn() -> Iterator[Scene]:
 
 def main() -> None:
     """Judge, tell, and write what is kept."""
-    from percussion_model.verification.accuracy.ladders import best_fitting
-
     FOLDER.mkdir(exist_ok=True)
     kept = 0
     for number, scene in enumerate(drawn(), 1):
-        found = settled(scene.replace(**{"solver.cells": best_fitting(scene, CELLS)}))
+        found = settled(scene.replace(**{"solver.cells": MODES}))
         print(f"{number}: {found.kind}, {found.order} a cycle, multiplier {found.multiplier:.2g}")
         if found.order != 1 or not abs(found.multiplier) < SHRINKING:
             continue

@@ -9,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter
 
 from docs.drawings.fronts import fronts
 from docs.drawings.shapes import INK, NOTE, SMALL, blank, lines_of_text
@@ -18,11 +19,10 @@ from percussion_model.interface.plotting.style import KN, MM, MODE_COLOURS, US
 from percussion_model.interface.plotting.window import closed_contacts
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.solvers.modal.records import STEP
-from percussion_model.verification.accuracy.ladders import FITS, misfit_of
 
 # A piston with a step, so that waves meet one [m], [m^2].
 STEPPED = [{"length": 0.105, "area": 0.0055}, {"length": 0.070, "area": 0.0035}]
-CELLS = 40
+STEPS = 40
 COLOURS = 21  # few, so that the file stays small
 SHOWN = 510e-6  # since the impact: up to the second one [s]
 FOLLOWED = 240e-6  # fronts, which loss wears down [s]
@@ -30,10 +30,11 @@ FOLLOWED = 240e-6  # fronts, which loss wears down [s]
 MODES = (8, 20, 80)
 MODE_LINES = (("#E69F00", "-"), ("#0072B2", "-"), ("#222222", "-"))
 BEFORE, AFTER = 5e-6, 95e-6
-COUNTS = range(5, 61)
+# Steps whose error is shown, and by which it is found.
+COUNTS, FINE = (6, 8, 10, 13, 16, 20, 24, 32, 40, 50, 64, 80), 400
 EXACT = (
     "Exact",
-    "waves: they run along their characteristics, a cell a step",
+    "waves: a bar of any length delays them by its transit time",
     "modes: motion and loss between two events, of the modes kept",
     "both: reflection at ends and steps, by impedance",
     "both: hard contact, without a stiffness to choose",
@@ -43,9 +44,8 @@ APPROXIMATE = (
     "Approximate",
     "modes: finitely many, so fronts are rounded and ring",
     f"modes: events to 1/{1 << STEP} of a step",
-    "waves: lengths in whole cells; where they share none, the",
-    "wave speed is off by the misfit, shown above",
     "waves: what arrives at an end is constant over a step",
+    "waves: a delay that is no whole number of steps spreads fronts",
 )
 
 
@@ -81,7 +81,7 @@ def stepped(scene: Scene) -> Scene:
 
 def impact_of(scene: Scene) -> Impact:
     """Run the first impact by waves, and keep the stress of all cells at every step."""
-    simulation = Simulation(scene.computed_by("wave", **{"solver.cells": CELLS}))
+    simulation = Simulation(scene.computed_by("wave", **{"solver.cells": STEPS}))
     step = simulation.solver.time_step
     rows = []
     for k in range(int(SHOWN / step) + 3):
@@ -107,7 +107,7 @@ def impact_of(scene: Scene) -> Impact:
 
 
 def draw_waves(scene: Scene) -> Figure:
-    """Draw an impact over time and depth, and the errors of modes and cells."""
+    """Draw an impact over time and depth, and the errors of modes and steps."""
     scene = stepped(scene)
     found = impact_of(scene)
     fig = Figure(figsize=(12.0, 8.4), layout="constrained")
@@ -118,7 +118,7 @@ def draw_waves(scene: Scene) -> Figure:
     _rock_modes(fig.add_subplot(left[1], sharex=above), found)
     above.tick_params(labelbottom=False)
     _modes(fig.add_subplot(grid[0, 1]), scene, found)
-    _cells(fig.add_subplot(grid[1, 1]), scene)
+    _steps(fig.add_subplot(grid[1, 1]), scene, found)
     _words(fig.add_subplot(grid[2, :]))
     style.head(fig, "The solvers: waves of one impact, piston with a step")
     return fig
@@ -211,8 +211,8 @@ def _modes(ax: Axes, scene: Scene, found: Impact) -> None:
         (f"{count} modes", scene.computed_by("modal", **{"solver.cells": count}), look)
         for count, look in zip(MODES, MODE_LINES, strict=True)
     ]
-    runs.append((f"waves, {CELLS} cells", scene.computed_by(
-        "wave", **{"solver.cells": CELLS}), ("#CC79A7", "--")))  # fmt: skip
+    runs.append((f"waves, {STEPS} steps", scene.computed_by(
+        "wave", **{"solver.cells": STEPS}), ("#CC79A7", "--")))  # fmt: skip
     times = np.arange(max(found.start - BEFORE, 0.0), found.start + AFTER, 2e-7)
     for name, chosen, (colour, dashes) in runs:
         force = Simulation(chosen).sample(times)["contact_force"]
@@ -223,21 +223,27 @@ def _modes(ax: Axes, scene: Scene, found: Impact) -> None:
                 "Modes: the fewer, the rounder the fronts")  # fmt: skip
 
 
-def _cells(ax: Axes, scene: Scene) -> None:
-    """Draw the misfit of the wave speed by the number of cells in the piston."""
-    pairs = [(count, misfit_of(scene, count)) for count in COUNTS]
-    for fits, colour, marker, label in (
-        (False, "#D55E00", "o", "lengths rounded to cells"),
-        (True, "#009E73", "D", "lengths are whole cells: no misfit"),
-    ):
-        chosen = [(n, 100.0 * m) for n, m in pairs if (m < FITS) == fits]
-        x, y = np.array(chosen).T
-        ax.plot(x, np.where(y < 100.0 * FITS, 0.0, y), marker, color=colour, markersize=4.5,
-                linestyle="", label=label, clip_on=False)  # fmt: skip
-    ax.set_ylim(0.0, 28.0)
-    ax.legend(loc="upper right", fontsize=SMALL)
-    style.label(ax, "cells in the piston", "misfit of the wave speed [%]",
-                "Waves: cells that fit the lengths, or not")  # fmt: skip
+def _steps(ax: Axes, scene: Scene, found: Impact) -> None:
+    """Draw the error of the force on the rock by the number of steps in the piston."""
+    times = found.start + np.arange(0.0, SHOWN, 2e-7)
+
+    def force(count: int) -> np.ndarray:
+        chosen = scene.computed_by("wave", **{"solver.cells": count})
+        return Simulation(chosen).sample(times)["bit_force"]
+
+    fine = force(FINE)
+    errors = np.array([np.abs(force(n) - fine).sum() for n in COUNTS]) / np.abs(fine).sum()
+    ax.loglog(COUNTS, 100.0 * errors, "o", color="#0072B2", markersize=4.5,
+              label="force on the rock, mean difference")  # fmt: skip
+    first = errors[-1] * COUNTS[-1] / np.array([COUNTS[0], COUNTS[-1]])
+    ax.loglog([COUNTS[0], COUNTS[-1]], 100.0 * first, "--", color=NOTE, linewidth=1.0,
+              label="first order")  # fmt: skip
+    ax.set_xticks([6, 10, 20, 40, 80], ["6", "10", "20", "40", "80"])
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.minorticks_off()
+    ax.legend(loc="lower left", fontsize=SMALL)
+    style.label(ax, "steps in which a wave crosses the piston", "error [%]",
+                "Waves: the more steps, the smaller the error")  # fmt: skip
 
 
 def _words(ax: Axes) -> None:

@@ -121,7 +121,6 @@ def test_the_default_solver_counts_and_another_own_one_where_it_was_not_run():
     assert replace(found, solver="wave").own == "wave"  # as of a power law
     del ladders["modal"]
     assert replace(made(ladders), solver="modal").own == "wave"
-    assert made({"chain": WAVE, "explicit": peer(9.0)}).own == "chain"
 
 
 def test_set_up_counts_where_it_is_asked_for():

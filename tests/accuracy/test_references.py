@@ -57,7 +57,7 @@ def reference(name: str) -> Reference:
 @pytest.mark.parametrize("name", SCENES)
 def test_each_scene_has_a_reference_that_says_how_it_was_made(name):
     found = reference(name)
-    own = {"chain"} if name.endswith("t38_rods") else {"wave", "modal"}
+    own = {"wave"} if name.endswith("t38_rods") else {"wave", "modal"}
     assert own | {"explicit", "date", "version"} <= set(found.made)
     assert not found.made["quick"]
     for key, bar in found.bars.items():

@@ -17,7 +17,6 @@ from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 from percussion_model.interface.terminal import show_stability
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.verification.hard_cases import (
-    ALL_SOLVERS,
     SOLVERS,
     hard_cases,
     measure,
@@ -64,7 +63,7 @@ def test_there_are_enough_cases_and_each_says_why():
     for case in hard_cases().values():
         assert case.hard
         assert case.holds
-        assert set(case.solvers) <= set(ALL_SOLVERS)
+        assert set(case.solvers) <= set(SOLVERS)
         assert case.scene.title == case.name
         assert not case.scene.unused or case.group in ("bars", "rock", "contact", "drive")
         assert set(case.differs) <= set(SOLVERS)

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from percussion_model.interface.plotting import style
-from percussion_model.verification.hard_cases import ALL_SOLVERS, Collection
+from percussion_model.verification.hard_cases import SOLVERS, Collection
 from percussion_model.verification.hard_cases.collection import MOST_MOMENTUM, MOST_RESIDUAL
 
 
@@ -50,7 +50,7 @@ SPREAD = 0.4
 def draw_stability(found: Collection) -> Figure:
     """Draw every case of every solver, sorted, against what is allowed; the greatest is named."""
     cases = list(dict.fromkeys(row["case"] for row in found.rows))
-    solvers = [name for name in ALL_SOLVERS if any(row["solver"] == name for row in found.rows)]
+    solvers = [name for name in SOLVERS if any(row["solver"] == name for row in found.rows)]
     fig = Figure(figsize=(12.5, 8.0), layout="constrained")
     for ax, panel in zip(fig.subplots(2, 2).flat, PANELS, strict=True):
         _panel(ax, found, panel, solvers)

@@ -54,8 +54,8 @@ KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(ro
 CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES, VISCOUS = (int(row) for row in Has)
 # A part of a step shorter than this is not worth a step of its own.
 SHORTEST_PART = 1e-3
-# A contact that is left with no more than this share of its force has opened: it is rounding.
-ROUNDING = 1e-14
+# Ends that approach each other by no more do not touch: where bars part, it is rounding [m/s].
+REST_APPROACH = 1e-12
 # Mean motion is derived anew from waves and gap so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
@@ -282,14 +282,14 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     v_p, v_t, yields = free_ends(par, s, chain, waves, push)
     before = par.lag * s.g_contact
     approach, was, opened, t_close = v_p - v_t - yields * before, s.closed, 0, -1.0
-    if was == 1 and approach <= ROUNDING * yields * s.g_contact:
-        s.closed, opened, approach = 0, 1, min(approach, 0.0)
+    if was == 1 and approach <= REST_APPROACH:
+        s.closed, opened = 0, 1
     touches = s.closed == 1
     if s.closed == 0:
-        if approach > 0.0 and s.gap < approach * tau:
+        if approach > REST_APPROACH and s.gap < approach * tau:
             t_close = s.gap / approach
             s.closed, touches = 1, t_close < 0.5 * tau
-        s.gap = 0.0 if s.closed == 1 else s.gap - approach * tau
+        s.gap = 0.0 if s.closed == 1 else max(s.gap - approach * tau, 0.0)
     impulse, force, more = 0.0, before + approach / yields, 1.0 + par.viscous
     if touches and elastic:
         impulse = approach / yields * more * tau

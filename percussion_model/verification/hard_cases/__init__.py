@@ -1,7 +1,6 @@
 """Hard cases: the nastiest scenes of the model, run by every solver."""
 
 from percussion_model.verification.hard_cases.cases import (
-    ALL_SOLVERS,
     SOLVERS,
     HardCase,
     hard_cases,
@@ -10,7 +9,6 @@ from percussion_model.verification.hard_cases.collection import Collection, run_
 from percussion_model.verification.hard_cases.measures import Measures, measure
 
 __all__ = [
-    "ALL_SOLVERS",
     "SOLVERS",
     "Collection",
     "HardCase",

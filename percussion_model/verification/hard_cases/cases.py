@@ -17,8 +17,6 @@ from typing import Any
 from percussion_model.scene.scene import Scene
 
 SOLVERS = ("wave", "modal", "fem", "rigid")
-# With those that some cases alone are for: drill strings.
-ALL_SOLVERS = (*SOLVERS, "chain")
 
 # What a table leaves out.
 DURATION, SETTLING_SHARE = 0.5, 0.1  # [s], and of it

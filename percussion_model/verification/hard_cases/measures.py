@@ -124,7 +124,7 @@ def measure(
     ----------
     case : HardCase
     solver : str
-        "wave", "fem", "rigid" or "chain".
+        "wave", "modal", "fem" or "rigid".
     share : float
         Share of the case's duration.
     again : bool
