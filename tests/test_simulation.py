@@ -263,7 +263,7 @@ def test_a_trace_has_its_interval_and_every_step_of_a_window():
     assert result.trace is not None
     times = result.trace["time"]
     inside = times[(times > 0.02) & (times <= 0.0201)]
-    assert len(inside) == int(1e-4 / result.time_step)
+    assert len(inside) - int(1e-4 / result.time_step) in (0, 1)  # by where a step begins
     assert np.diff(inside) == pytest.approx(result.time_step)
     assert len(times) == 51 + len(inside)
     assert np.isin(np.arange(50) * 1e-3, times).all()

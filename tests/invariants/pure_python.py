@@ -12,12 +12,11 @@ import sys
 
 import numpy as np
 
-# One blow of a coarse reference drill, its leaps off so that every step is made.
+# One blow of a coarse reference drill, the leaps of modes off so that every step is made.
 SCENES = {
     "wave": {
         "solver.name": "wave",
         "solver.cells": 20,
-        "solver.leaps": False,
         "run.settle": 0.0,
     },
     "modal": {
@@ -62,55 +61,47 @@ def replace(name: str, function) -> None:
 
 
 def weaken_reflection() -> None:
-    """Let the free top end of the piston return 0.999 of each wave."""
-    from percussion_model.solvers.wave.ends import outer_waves as send
+    """Let the lower end of the bit return 0.999 of each wave."""
+    from percussion_model.solvers.wave.step import UP_OUT
+    from percussion_model.solvers.wave.step import meet_rock as meet
 
-    def outer_waves(par, w, c, n, r, *ends):
-        send(par, w, c, n, r, *ends)
-        if n == par.n_p:
-            w[2 - r, 0] *= FAULT
+    def meet_rock(par, s, chain, waves, *rest):
+        impulse = meet(par, s, chain, waves, *rest)
+        waves.came[UP_OUT, par.sections - 1] *= FAULT
+        return impulse
 
-    replace("outer_waves", outer_waves)
+    replace("meet_rock", meet_rock)
 
 
 def weaken_contact() -> None:
-    """Let piston and bit push each other with 0.999 of the force."""
-    from percussion_model.solvers.wave.contact import bar_contact as contact
+    """Let the bit feel 0.999 of what the piston sends into it."""
+    from percussion_model.solvers.wave.step import DOWN_OUT, FIRST
+    from percussion_model.solvers.wave.step import meet_piston as meet
 
-    def bar_contact(closed, gap, v_p, v_t, z_p, z_t, tau):
-        out = list(contact(closed, gap, v_p, v_t, z_p, z_t, tau))
-        if out[0] == 1:
-            free = max(out[8], 0.0)
-            rest = tau - free
-            force = FAULT * z_p * z_t / (z_p + z_t) * (v_p - v_t)
-            v, u = v_p - force / z_p, v_t + force / z_t
-            out[2:6] = (
-                v_p * free + v * rest,
-                v_p * v_p * free + v * v * rest,
-                v_t * free + u * rest,
-                v_t * v_t * free + u * u * rest,
-            )
-            out[6:8] = force * rest, 0.5 * force * rest * rest
-        return tuple(out)
+    def meet_piston(par, s, chain, waves, *rest):
+        impulse = meet(par, s, chain, waves, *rest)
+        waves.came[DOWN_OUT, int(chain.bodies[par.struck, FIRST])] *= FAULT
+        return impulse
 
-    replace("bar_contact", bar_contact)
+    replace("meet_piston", meet_piston)
 
 
 def lose_body_force(at: int = 1000) -> None:
-    """Let the cells of the piston feel no body force in one step."""
-    from percussion_model.solvers.wave.bar import face_velocities as faces
+    """Let the piston feel no body force in one step."""
+    from percussion_model.solvers.wave.step import ACCELERATION
+    from percussion_model.solvers.wave.step import accelerations as full
 
     count = 0
 
-    def face_velocities(w, c, n, r, kick):
+    def accelerations(par, s, chain, waves, push):
         nonlocal count
-        if n == 20:
-            count += 1
-            if count == at:
-                kick = 0.0
-        faces(w, c, n, r, kick)
+        damper = full(par, s, chain, waves, push)
+        count += 1
+        if count == at:
+            waves.came[ACCELERATION, 0] = 0.0
+        return damper
 
-    replace("face_velocities", face_velocities)
+    replace("accelerations", accelerations)
 
 
 def weaken_penalty() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from percussion_model import EventKind, Mode, Scene, SceneError, Section, Simulation
+from tests.properties.scenes import with_loss_that_fits
 
 DURATION = 0.1  # two blows and a part of the third [s]
 
@@ -71,9 +72,10 @@ def build(choice):
     if choice["piston"] == "absent":
         changes["start.bit_velocity"] = 5.25
     try:
-        return Scene().replace(**changes)
+        scene = Scene().replace(**changes)
     except SceneError:
         return None
+    return with_loss_that_fits(scene) if choice["solver"] == "wave" else scene
 
 
 def cover_pairs(seed=7):
