@@ -32,7 +32,8 @@ BARRIER_FROM = 100
 MESHES = ((60, 0.9), (60, 0.6), (90, 0.6))
 # Modes of another witness, where there are tables for as many.
 FINE = 112
-# Cells of waves for rock that elements do not carry: the best, and how far a half of them is off.
+# Steps of waves in the piston for rock that elements do not carry: the best; half of them tell
+# how far these are off.
 CELLS = 80
 # An error is unsound that is so many times what was stated.
 UNSOUND = 3.0
@@ -88,7 +89,7 @@ def truth(scene: Scene) -> tuple[float, float]:
 
 
 def truth_by_waves(scene: Scene) -> tuple[float, float]:
-    """The same by waves, which are of first order in the length of a cell."""
+    """The same by waves, which are of first order in the step."""
     rates = [
         simulate(
             scene.replace(**{"solver.name": "wave", "solver.cells": cells}),

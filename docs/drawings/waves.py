@@ -9,7 +9,6 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
 
 from docs.drawings.fronts import fronts
 from docs.drawings.shapes import INK, NOTE, SMALL, blank, lines_of_text
@@ -239,7 +238,7 @@ def _steps(ax: Axes, scene: Scene, found: Impact) -> None:
     ax.loglog([COUNTS[0], COUNTS[-1]], 100.0 * first, "--", color=NOTE, linewidth=1.0,
               label="first order")  # fmt: skip
     ax.set_xticks([6, 10, 20, 40, 80], ["6", "10", "20", "40", "80"])
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.set_yticks([0.2, 0.5, 1.0, 2.0], ["0.2", "0.5", "1", "2"])
     ax.minorticks_off()
     ax.legend(loc="lower left", fontsize=SMALL)
     style.label(ax, "steps in which a wave crosses the piston", "error [%]",

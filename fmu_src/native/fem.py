@@ -48,7 +48,7 @@ from percussion_model.solvers.fem.records import (
     Key,
     Node,
     Probe,
-    Trial,
+    Stage,
 )
 from percussion_model.solvers.setup import MOST_CELLS
 
@@ -56,7 +56,7 @@ parameters, state_in = views_of(FEM_PAR, FEM_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = FEM_LIMITS.rows
 PAR_BYTES = FEM_PAR.itemsize
 WORK = work_at(FEM_STATE)  # place of the nodes in what moves
-ROWS, FACTOR_ROWS, KEYS, TRIALS = len(Node), 2 * len(Factor), len(Key), len(Trial)
+ROWS, FACTOR_ROWS, KEYS, STAGES = len(Node), 2 * len(Factor), len(Key), len(Stage)
 PROBES, COLUMNS = len(Probe), len(Column)
 # A state is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2.0
@@ -89,7 +89,7 @@ def create(numbers, bar, place):
     par = np.zeros(1, FEM_PAR)
     fill_fem_parameters(par[0], numbers, bars)
     room = (
-        np.zeros((FACTOR_ROWS, max(n, KEYS))), np.zeros((TRIALS, n)), np.zeros((PROBES, COLUMNS)),
+        np.zeros((FACTOR_ROWS, max(n, KEYS))), np.zeros((STAGES, n)), np.zeros((PROBES, COLUMNS)),
     )  # fmt: skip
     moving = WORK + lines(8 * ROWS * n)
     base, room_at, tables_at = make_memory(

@@ -106,20 +106,20 @@ def lose_body_force(at: int = 1000) -> None:
 
 def weaken_penalty() -> None:
     """Let the bit feel 0.999 of what the penalty contact does to it."""
-    from percussion_model.solvers.fem.records import Trial
+    from percussion_model.solvers.fem.records import Stage
     from percussion_model.solvers.fem.solve import meet_at_contact as meet
 
     def meet_at_contact(par, s, f, at, x, h):
         meet(par, s, f, at, x, h)
         if s.closed == 1:
-            x[Trial.RE, par.n_p] *= FAULT
+            x[Stage.RE, par.n_p] *= FAULT
 
     replace("meet_at_contact", meet_at_contact)
 
 
 def lose_load(at: int = 100) -> None:
     """Let the piston feel neither gravity nor drive in one step."""
-    from percussion_model.solvers.fem.records import Mesh, Trial
+    from percussion_model.solvers.fem.records import Mesh, Stage
     from percussion_model.solvers.fem.scheme import drive_force
     from percussion_model.solvers.fem.scheme import load as full
 
@@ -132,7 +132,7 @@ def lose_load(at: int = 100) -> None:
         if count == at:
             a = par.gravity + drive_force(par, s) / par.mass_p
             for i in range(par.n_p):
-                x[Trial.RE, i] -= a * c[Mesh.SHARE, i]
+                x[Stage.RE, i] -= a * c[Mesh.SHARE, i]
 
     replace("load", load)
 

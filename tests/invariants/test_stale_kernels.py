@@ -16,7 +16,7 @@ FORCES = """
 import json
 import numpy as np
 from percussion_model.physics.records import BLOW, EVENT, DriveKind, Piston
-from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE, Mesh, Node, Trial
+from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE, Mesh, Node, Stage
 from percussion_model.solvers.fem.scheme import load
 from percussion_model.solvers.rigid.forces import contact_force
 from percussion_model.solvers.rigid.records import RIGID_PAR, RIGID_STATE
@@ -39,9 +39,9 @@ record_contact(par[0], state[0], waves, 0, 1.0, 1.0, 0.0, 0.0, 1.0, *lists)
 found["wave"] = float(state[0]["b_impact"])
 par, state = records(FEM_PAR, FEM_STATE)
 par["n_p"], par["n_b"] = 1, 2
-nodes, mesh, x = np.zeros((len(Node), 3)), np.ones((len(Mesh), 3)), np.zeros((len(Trial), 3))
+nodes, mesh, x = np.zeros((len(Node), 3)), np.ones((len(Mesh), 3)), np.zeros((len(Stage), 3))
 load(par[0], state[0], nodes, mesh, x, 1.0)
-found["fem"] = x[Trial.RE, 0]
+found["fem"] = x[Stage.RE, 0]
 par, state = records(RIGID_PAR, RIGID_STATE)
 found["rigid"] = contact_force(par[0], state[0], 0.0)
 print(json.dumps(found))

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from percussion_model.analysis.fitting.indentation import SlowRock
 from percussion_model.analysis.fitting.measurements import Curve, FitError, least_noise, named
-from percussion_model.analysis.fitting.slow_test import SlowRock
 from percussion_model.scene.scene import Scene
 
 # Data that each branch must have with force on the rock.

@@ -35,7 +35,7 @@ class Mesh(IntEnum):
     SHARE = 4  # mass that moves with a node: row sum of the mass matrix [kg]
 
 
-class Trial(IntEnum):
+class Stage(IntEnum):
     """Rows of scratch: a step that is tried."""
 
     U = 0  # displacement at its end; the first two rows are as those of `Node`
@@ -103,7 +103,7 @@ class Elements(NamedTuple):
     c : float array, shape (len(Mesh), n)
     f : float array, shape (2 len(Factor), at least n)
         Factorisations, kept from call to call; zero at first.
-    x : float array, shape (len(Trial), n)
+    x : float array, shape (len(Stage), n)
         Scratch: a step that is tried.
     q : float array, shape (len(Probe), len(Column))
         Scratch: the event functions.

@@ -12,7 +12,7 @@ from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import bit_acceleration, drive_force, piston_acceleration
 from percussion_model.physics.rock import damping, present_line, take_step_line
 from percussion_model.solvers.fem.bars import read_ahead
-from percussion_model.solvers.fem.records import Mesh, Node, Trial
+from percussion_model.solvers.fem.records import Mesh, Node, Stage
 from percussion_model.solvers.fem.solve import factors, substitute
 
 
@@ -25,44 +25,44 @@ def load(par, s, w, c, x, h):
     h_im = h * par.mu_im
     late = par.eta + h_re
     for i in range(n):
-        x[Trial.TARGET_RE, i] = w[Node.U, i] + late * w[Node.V, i]
-        x[Trial.TARGET_IM, i] = h_im * w[Node.V, i]
+        x[Stage.TARGET_RE, i] = w[Node.U, i] + late * w[Node.V, i]
+        x[Stage.TARGET_IM, i] = h_im * w[Node.V, i]
     a_b = bit_acceleration(par, s)
     a_p = 0.0
     if n_p > 0:
         a_p = piston_acceleration(par, drive_force(par, s))
     # elements pull their upper node down
-    x[Trial.RE, 0] = c[Mesh.STIFFNESS, 0] * (x[Trial.TARGET_RE, 1] - x[Trial.TARGET_RE, 0])
-    x[Trial.IM, 0] = c[Mesh.STIFFNESS, 0] * (x[Trial.TARGET_IM, 1] - x[Trial.TARGET_IM, 0])
+    x[Stage.RE, 0] = c[Mesh.STIFFNESS, 0] * (x[Stage.TARGET_RE, 1] - x[Stage.TARGET_RE, 0])
+    x[Stage.IM, 0] = c[Mesh.STIFFNESS, 0] * (x[Stage.TARGET_IM, 1] - x[Stage.TARGET_IM, 0])
     for i in range(n - 2):
-        here = x[Trial.TARGET_RE, i + 1]
-        x[Trial.RE, i + 1] = c[Mesh.STIFFNESS, i + 1] * (x[Trial.TARGET_RE, i + 2] - here) - c[
+        here = x[Stage.TARGET_RE, i + 1]
+        x[Stage.RE, i + 1] = c[Mesh.STIFFNESS, i + 1] * (x[Stage.TARGET_RE, i + 2] - here) - c[
             Mesh.STIFFNESS, i
-        ] * (here - x[Trial.TARGET_RE, i])
-        there = x[Trial.TARGET_IM, i + 1]
-        x[Trial.IM, i + 1] = c[Mesh.STIFFNESS, i + 1] * (x[Trial.TARGET_IM, i + 2] - there) - c[
+        ] * (here - x[Stage.TARGET_RE, i])
+        there = x[Stage.TARGET_IM, i + 1]
+        x[Stage.IM, i + 1] = c[Mesh.STIFFNESS, i + 1] * (x[Stage.TARGET_IM, i + 2] - there) - c[
             Mesh.STIFFNESS, i
-        ] * (there - x[Trial.TARGET_IM, i])
-    x[Trial.RE, n - 1] = c[Mesh.STIFFNESS, n - 2] * (
-        x[Trial.TARGET_RE, n - 2] - x[Trial.TARGET_RE, n - 1]
+        ] * (there - x[Stage.TARGET_IM, i])
+    x[Stage.RE, n - 1] = c[Mesh.STIFFNESS, n - 2] * (
+        x[Stage.TARGET_RE, n - 2] - x[Stage.TARGET_RE, n - 1]
     )
-    x[Trial.IM, n - 1] = c[Mesh.STIFFNESS, n - 2] * (
-        x[Trial.TARGET_IM, n - 2] - x[Trial.TARGET_IM, n - 1]
+    x[Stage.IM, n - 1] = c[Mesh.STIFFNESS, n - 2] * (
+        x[Stage.TARGET_IM, n - 2] - x[Stage.TARGET_IM, n - 1]
     )
     for i in range(n_p):
-        x[Trial.RE, i] += a_p * c[Mesh.SHARE, i]
+        x[Stage.RE, i] += a_p * c[Mesh.SHARE, i]
     for i in range(par.n_b):
-        x[Trial.RE, n_p + i] += a_b * c[Mesh.SHARE, n_p + i]
+        x[Stage.RE, n_p + i] += a_b * c[Mesh.SHARE, n_p + i]
     if s.closed == 1:
         push_re = -par.k_c * (s.gap + h_re * s.gap_rate)
         push_im = -par.k_c * h_im * s.gap_rate
-        x[Trial.RE, n_p - 1] -= push_re
-        x[Trial.IM, n_p - 1] -= push_im
-        x[Trial.RE, n_p] += push_re
-        x[Trial.IM, n_p] += push_im
+        x[Stage.RE, n_p - 1] -= push_re
+        x[Stage.IM, n_p - 1] -= push_im
+        x[Stage.RE, n_p] += push_re
+        x[Stage.IM, n_p] += push_im
     K, P = present_line(par, s)
-    x[Trial.RE, n - 1] -= K * (s.p - P + h_re * s.v_end) + damping(s) * s.v_end
-    x[Trial.IM, n - 1] -= K * h_im * s.v_end
+    x[Stage.RE, n - 1] -= K * (s.p - P + h_re * s.v_end) + damping(s) * s.v_end
+    x[Stage.IM, n - 1] -= K * h_im * s.v_end
 
 
 @kernel
@@ -80,7 +80,7 @@ def try_step(par, s, w, c, f, x, h):
     f : float array
         Factorisations.
     x : float array
-        Scratch (`Trial`).
+        Scratch (`Stage`).
     h : float
         Length of the step [s].
     """
@@ -93,9 +93,9 @@ def try_step(par, s, w, c, f, x, h):
     by_im = h * h * (tilt * par.mu_re - par.mu_im)
     for i in range(par.n_p + par.n_b):
         x[Node.U, i] = w[Node.U, i] + (
-            h * w[Node.V, i] + (by_re * x[Trial.RE, i] + by_im * x[Trial.IM, i])
+            h * w[Node.V, i] + (by_re * x[Stage.RE, i] + by_im * x[Stage.IM, i])
         )
-        x[Node.V, i] = w[Node.V, i] + h * (x[Trial.RE, i] + tilt * x[Trial.IM, i])
+        x[Node.V, i] = w[Node.V, i] + h * (x[Stage.RE, i] + tilt * x[Stage.IM, i])
     read_ahead(par, s, x, c)
     s.count_trials += 1
 
@@ -103,11 +103,11 @@ def try_step(par, s, w, c, f, x, h):
 @inlined
 def rate_bend(par, x, i, h):
     """Slope of a node's velocity over the stages, by the step [m/s]."""
-    return h * (par.mu_re * x[Trial.IM, i] + par.mu_im * x[Trial.RE, i]) / par.mu_im
+    return h * (par.mu_re * x[Stage.IM, i] + par.mu_im * x[Stage.RE, i]) / par.mu_im
 
 
 @merged
 def acceleration(par, x, i, end):
     """Acceleration of a node at the start (`end` 0) or the end (1) of a tried step [m/s2]."""
-    bend = x[Trial.IM, i] / par.mu_im
-    return x[Trial.RE, i] + (end - par.mu_re) * bend
+    bend = x[Stage.IM, i] / par.mu_im
+    return x[Stage.RE, i] + (end - par.mu_re) * bend

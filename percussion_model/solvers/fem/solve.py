@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.rock import damping, present_line
-from percussion_model.solvers.fem.records import Factor, Key, Mesh, Trial
+from percussion_model.solvers.fem.records import Factor, Key, Mesh, Stage
 
 ROWS = len(Factor)
 
@@ -99,25 +99,25 @@ def factors(par, s, c, f, h):
 def meet_at_contact(par, s, f, at, x, h):
     """Solve for the two nodes at the contact, whose spring couples them while it is closed."""
     lower = par.n_p
-    re = x[Trial.RE, lower]
-    im = x[Trial.IM, lower]
+    re = x[Stage.RE, lower]
+    im = x[Stage.IM, lower]
     b_re = f[at + Factor.PIVOT_RE, lower]
     b_im = f[at + Factor.PIVOT_IM, lower]
     if s.closed == 0:
         size = b_re * b_re + b_im * b_im
-        x[Trial.RE, lower] = (re * b_re + im * b_im) / size
-        x[Trial.IM, lower] = (im * b_re - re * b_im) / size
+        x[Stage.RE, lower] = (re * b_re + im * b_im) / size
+        x[Stage.IM, lower] = (im * b_re - re * b_im) / size
     if par.n_p == 0:
         return
     upper = par.n_p - 1
-    up_re = x[Trial.RE, upper]
-    up_im = x[Trial.IM, upper]
+    up_re = x[Stage.RE, upper]
+    up_im = x[Stage.IM, upper]
     p_re = f[at + Factor.PIVOT_RE, upper]
     p_im = f[at + Factor.PIVOT_IM, upper]
     if s.closed == 0:
         size = p_re * p_re + p_im * p_im
-        x[Trial.RE, upper] = (up_re * p_re + up_im * p_im) / size
-        x[Trial.IM, upper] = (up_im * p_re - up_re * p_im) / size
+        x[Stage.RE, upper] = (up_re * p_re + up_im * p_im) / size
+        x[Stage.IM, upper] = (up_im * p_re - up_re * p_im) / size
         return
     # [p + q, -q; -q, b + q]: its determinant is p b + q (p + b), without cancellation
     h_re = h * par.mu_re
@@ -135,19 +135,19 @@ def meet_at_contact(par, s, f, at, x, h):
     low_re = re * p_re - im * p_im + both_re
     low_im = re * p_im + im * p_re + both_im
     size = det_re * det_re + det_im * det_im
-    x[Trial.RE, upper] = (top_re * det_re + top_im * det_im) / size
-    x[Trial.IM, upper] = (top_im * det_re - top_re * det_im) / size
-    x[Trial.RE, lower] = (low_re * det_re + low_im * det_im) / size
-    x[Trial.IM, lower] = (low_im * det_re - low_re * det_im) / size
+    x[Stage.RE, upper] = (top_re * det_re + top_im * det_im) / size
+    x[Stage.IM, upper] = (top_im * det_re - top_re * det_im) / size
+    x[Stage.RE, lower] = (low_re * det_re + low_im * det_im) / size
+    x[Stage.IM, lower] = (low_im * det_re - low_re * det_im) / size
 
 
 @inlined
 def forward(f, at, x, i, re, im):
     """Eliminate row `i`, with what the row before it came to."""
-    next_re = x[Trial.RE, i] - f[at + Factor.LOW_RE, i] * re + f[at + Factor.LOW_IM, i] * im
-    next_im = x[Trial.IM, i] - f[at + Factor.LOW_RE, i] * im - f[at + Factor.LOW_IM, i] * re
-    x[Trial.RE, i] = next_re
-    x[Trial.IM, i] = next_im
+    next_re = x[Stage.RE, i] - f[at + Factor.LOW_RE, i] * re + f[at + Factor.LOW_IM, i] * im
+    next_im = x[Stage.IM, i] - f[at + Factor.LOW_RE, i] * im - f[at + Factor.LOW_IM, i] * re
+    x[Stage.RE, i] = next_re
+    x[Stage.IM, i] = next_im
     return next_re, next_im
 
 
@@ -155,15 +155,15 @@ def forward(f, at, x, i, re, im):
 def backward(f, at, x, i, solved, re, im):
     """Solve for row `i`, with the solution of the row `solved` next to it."""
     pivot_re = (
-        x[Trial.RE, i] * f[at + Factor.PIVOT_RE, i] - x[Trial.IM, i] * f[at + Factor.PIVOT_IM, i]
+        x[Stage.RE, i] * f[at + Factor.PIVOT_RE, i] - x[Stage.IM, i] * f[at + Factor.PIVOT_IM, i]
     )
     pivot_im = (
-        x[Trial.RE, i] * f[at + Factor.PIVOT_IM, i] + x[Trial.IM, i] * f[at + Factor.PIVOT_RE, i]
+        x[Stage.RE, i] * f[at + Factor.PIVOT_IM, i] + x[Stage.IM, i] * f[at + Factor.PIVOT_RE, i]
     )
     next_re = pivot_re - f[at + Factor.LOW_RE, solved] * re + f[at + Factor.LOW_IM, solved] * im
     next_im = pivot_im - f[at + Factor.LOW_RE, solved] * im - f[at + Factor.LOW_IM, solved] * re
-    x[Trial.RE, i] = next_re
-    x[Trial.IM, i] = next_im
+    x[Stage.RE, i] = next_re
+    x[Stage.IM, i] = next_im
     return next_re, next_im
 
 
@@ -178,8 +178,8 @@ def substitute(par, s, f, slot, x, h):
     n_p = par.n_p
     last = n_p + par.n_b - 1
     both = max(min(n_p, par.n_b) - 1, 0)
-    a, b = x[Trial.RE, 0], x[Trial.IM, 0]
-    c, d = x[Trial.RE, last], x[Trial.IM, last]
+    a, b = x[Stage.RE, 0], x[Stage.IM, 0]
+    c, d = x[Stage.RE, last], x[Stage.IM, last]
     for k in range(both):
         a, b = forward(f, at, x, 1 + k, a, b)
         c, d = forward(f, at, x, last - 1 - k, c, d)
@@ -188,9 +188,9 @@ def substitute(par, s, f, slot, x, h):
     for k in range(both, par.n_b - 1):
         c, d = forward(f, at, x, last - 1 - k, c, d)
     meet_at_contact(par, s, f, at, x, h)
-    c, d = x[Trial.RE, n_p], x[Trial.IM, n_p]
+    c, d = x[Stage.RE, n_p], x[Stage.IM, n_p]
     if n_p > 0:
-        a, b = x[Trial.RE, n_p - 1], x[Trial.IM, n_p - 1]
+        a, b = x[Stage.RE, n_p - 1], x[Stage.IM, n_p - 1]
     for k in range(both):
         a, b = backward(f, at, x, n_p - 2 - k, n_p - 1 - k, a, b)
         c, d = backward(f, at, x, n_p + 1 + k, n_p + k, c, d)

@@ -34,7 +34,7 @@ from percussion_model.solvers.fem.records import (
     Mesh,
     Node,
     Probe,
-    Trial,
+    Stage,
 )
 from percussion_model.solvers.setup import refuse_many
 from percussion_model.solvers.state import State, words_of
@@ -84,7 +84,7 @@ class FemSolver(Solver):
         n = self._mesh.shape[1]
         self._scratch = (
             np.zeros((2 * len(Factor), max(n, len(Key)))),
-            np.zeros((len(Trial), n)),
+            np.zeros((len(Stage), n)),
             np.zeros((len(Probe), len(Column))),
         )
 

@@ -20,7 +20,7 @@ from percussion_model.physics.rock import (
     spring_force,
 )
 from percussion_model.solvers.fem.bars import read_nodes
-from percussion_model.solvers.fem.records import Mesh, Node, Trial
+from percussion_model.solvers.fem.records import Mesh, Node, Stage
 from percussion_model.solvers.fem.scheme import rate_bend
 
 # Mean square of a bend that rises by one over the step.
@@ -48,18 +48,18 @@ def book_bars(par, w, c, x, h):
     by = 1.0 / h
     turn = 1.0 / par.mu_im
     for i in range(n):
-        x[Trial.TARGET_RE, i] = (x[Node.U, i] - w[Node.U, i]) * by
-        x[Trial.TARGET_IM, i] = h * turn * (par.mu_re * x[Trial.IM, i] + par.mu_im * x[Trial.RE, i])
-        x[Trial.IM, i] = x[Trial.IM, i] * turn
+        x[Stage.TARGET_RE, i] = (x[Node.U, i] - w[Node.U, i]) * by
+        x[Stage.TARGET_IM, i] = h * turn * (par.mu_re * x[Stage.IM, i] + par.mu_im * x[Stage.RE, i])
+        x[Stage.IM, i] = x[Stage.IM, i] * turn
     for i in range(n - 1):
-        mean = x[Trial.TARGET_RE, i + 1] - x[Trial.TARGET_RE, i]
-        bend = x[Trial.TARGET_IM, i + 1] - x[Trial.TARGET_IM, i]
+        mean = x[Stage.TARGET_RE, i + 1] - x[Stage.TARGET_RE, i]
+        bend = x[Stage.TARGET_IM, i + 1] - x[Stage.TARGET_IM, i]
         stiff = c[Mesh.STIFFNESS, i] * (bend * bend)
         w[Node.LOSS, i] += viscous * (c[Mesh.STIFFNESS, i] * (mean * mean) + TWELFTH * stiff)
-        a = x[Trial.IM, i]
-        inert = c[Mesh.MASS, i] * (a * a) + 2.0 * c[Mesh.COUPLING, i] * (a * x[Trial.IM, i + 1])
+        a = x[Stage.IM, i]
+        inert = c[Mesh.MASS, i] * (a * a) + 2.0 * c[Mesh.COUPLING, i] * (a * x[Stage.IM, i + 1])
         w[Node.NUMERICAL, i] += defect * (stiff + inert)
-    a = x[Trial.IM, n - 1]
+    a = x[Stage.IM, n - 1]
     w[Node.NUMERICAL, n - 1] += defect * (c[Mesh.MASS, n - 1] * (a * a))
 
 

@@ -91,7 +91,7 @@ class Answer(NamedTuple):
     begin: Place  # of loading along a curve
 
 
-class Trial(NamedTuple):
+class TriedStep(NamedTuple):
     """A step that may be made."""
 
     h: float  # [s]
@@ -199,7 +199,7 @@ def try_step(par, s, bars, level):
         flight = flight_of(par, s, bars, level, h, way_b, ends.top - ends.bit / par.mass_b)
         way_p, low_p, gap = flight.way, flight.low, flight.gap
     work = C * path * path / h
-    return Trial(
+    return TriedStep(
         h, ends, force, first, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap
     )
 

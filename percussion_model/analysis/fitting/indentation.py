@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.physics.indentation import weigh
 from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.power_law import fresh_force, fresh_recovery, start_loading
 from percussion_model.physics.records import RockKind
-from percussion_model.physics.slow_test import weigh
 from percussion_model.physics.state import COMMON_PARAMETERS, COMMON_STATE
 from percussion_model.scene.rock_law import fill_power
 from percussion_model.scene.scene import Scene
