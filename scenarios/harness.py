@@ -23,7 +23,7 @@ from percussion_model.coupling.component import (
 from percussion_model.interface.progress import progress
 
 from . import results
-from .drawing import in_style, save_png, stacked
+from .drawing import in_style, stacked
 from .results import Archive, ScenarioError
 
 # A constant, or a function of time.
@@ -192,6 +192,8 @@ def plot(path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequen
     Path
         The PNG file.
     """
+    from percussion_model.interface.plotting.style import save_png
+
     missing = {name for _, _, *names in panels for name in names} - found.keys()
     if missing:
         raise ScenarioError(f"the FMU has no output {min(missing)}")
@@ -202,7 +204,7 @@ def plot(path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequen
             ax.plot(found["time"], float(factor) * found[name], linewidth=1.2, label=name)
         if len(names) > 1:
             ax.legend(loc="upper right")
-    return save_png(figure, path)
+    return save_png(figure, path, 110)
 
 
 def command_line(
