@@ -53,11 +53,12 @@ class Instance(Component):
     """
 
     def __init__(self, fmu: str | Path, name: str = "instance") -> None:
-        folder, self._own = str(fmu), None
+        self.folder, self._own = str(fmu), None
         if Path(fmu).is_file():
             self._own = tempfile.mkdtemp(prefix="fmu-")
-            folder = extract(folder, self._own)
-        super().__init__(name, folder, read_description(name, folder))
+            self.folder = extract(self.folder, self._own)
+        self.description = read_description(name, self.folder)
+        super().__init__(name, self.folder, self.description)
         self.time = 0.0
 
     def start(self, time: float = 0.0, **values: Any) -> Instance:
