@@ -22,7 +22,7 @@ from typing import Any
 from percussion_model.interface.progress import progress
 from percussion_model.simulation.files import staged_file
 
-from .drawing import in_style, save_png
+from .drawing import in_style
 from .harness import Instance, fmu
 from .results import command_line
 
@@ -138,7 +138,7 @@ def draw(found: dict[str, list[dict[str, Any]]], path: Path) -> Path:
     """Draw error and time against step."""
     from matplotlib.figure import Figure
 
-    from percussion_model.interface.plotting.style import RULE_COLOUR, head, label
+    from percussion_model.interface.plotting.style import RULE_COLOUR, head, label, save_png
 
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)

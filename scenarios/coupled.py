@@ -20,7 +20,7 @@ from percussion_model.interface.tables import print_table
 from percussion_model.simulation.files import staged_texts
 from percussion_model.simulation.uncertain import in_digits
 
-from .drawing import in_style, save_png, stacked
+from .drawing import in_style, stacked
 from .results import command_line, system, tell
 
 STEP = 2e-3  # the longest at which the shoulder is as stiff as it is [s]
@@ -98,7 +98,7 @@ def draw_runs(
     """
     from matplotlib.patches import Patch
 
-    from percussion_model.interface.plotting.style import SHADE_COLOUR
+    from percussion_model.interface.plotting.style import SHADE_COLOUR, save_png
 
     labels = [label for label, _, _ in panels]
     figure, axes = stacked(title, labels, (8.5, 1.6 + 1.5 * len(panels)))
@@ -116,7 +116,7 @@ def draw_runs(
         handles.append(Patch(color=SHADE_COLOUR))
         names.append(text)
     figure.legend(handles, names, loc="outside lower center", ncols=4)
-    return save_png(figure, path)
+    return save_png(figure, path, 110)
 
 
 def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path) -> list[Path]:

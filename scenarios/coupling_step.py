@@ -22,7 +22,7 @@ from percussion_model.simulation.uncertain import change_text, with_error
 from percussion_model.verification.accuracy.orders import Order, fitted_order
 
 from .coupled import whole
-from .drawing import in_style, save_png
+from .drawing import in_style
 from .results import command_line, system, tell
 
 NAME = "coupling_step"
@@ -150,7 +150,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     """Draw errors of one blow over the step, and what the shoulder takes in eight."""
     from matplotlib.figure import Figure
 
-    from percussion_model.interface.plotting.style import RULE_COLOUR, head, label
+    from percussion_model.interface.plotting.style import RULE_COLOUR, head, label, save_png
 
     figure = Figure(figsize=(12.0, 5.0), layout="constrained")
     axes = figure.subplots(1, 3)
@@ -183,7 +183,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     axes[2].annotate("default", (1e3 * UNCHANGED, 0.5), (4, 0), xycoords=(
         "data", "axes fraction"), textcoords="offset points", va="top")  # fmt: skip
     head(figure, "Error of a coupled run against its communication step")
-    return save_png(figure, path)
+    return save_png(figure, path, 110)
 
 
 def measure(archive: Path) -> tuple[OneBlow, list[OneBlow], list[EightBlows]]:

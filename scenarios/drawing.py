@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
-from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
@@ -61,10 +60,3 @@ def stacked(
     head(figure, title)
     figure.align_ylabels()
     return figure, list(axes[:, 0])
-
-
-def save_png(figure: Figure, path: Path, dpi: float = 110) -> Path:
-    """Write a figure, whole or not at all; return its file."""
-    from percussion_model.interface.plotting.style import save_png as save
-
-    return save(figure, path, dpi)

@@ -19,7 +19,7 @@ from percussion_model.simulation.uncertain import (
 )
 
 from .coupled import save_runs, save_table, whole
-from .drawing import in_style, save_png
+from .drawing import in_style
 from .results import command_line, system, tell
 
 NAME = "extremum_seeking"
@@ -133,7 +133,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill and the ways up."""
     from matplotlib.figure import Figure
 
-    from percussion_model.interface.plotting.style import head, label
+    from percussion_model.interface.plotting.style import head, label, save_png
 
     (best_feed, best_rate), _ = top_of(hill)
     figure = Figure(figsize=(11.0, 4.8), layout="constrained")
@@ -157,7 +157,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     for ax in axes:
         ax.legend()
     head(figure, "Extremum seeking on the feed force")
-    return save_png(figure, path)
+    return save_png(figure, path, 110)
 
 
 def main(paths: Sequence[Path], folder: Path) -> list[Path]:

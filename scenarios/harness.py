@@ -23,7 +23,7 @@ from percussion_model.coupling.component import (
 from percussion_model.interface.progress import progress
 
 from . import results
-from .drawing import in_style, save_png, stacked
+from .drawing import in_style, stacked
 from .results import Archive, ScenarioError
 
 # A constant, or a function of time.
@@ -53,11 +53,12 @@ class Instance(Component):
     """
 
     def __init__(self, fmu: str | Path, name: str = "instance") -> None:
-        folder, self._own = str(fmu), None
+        self.folder, self._own = str(fmu), None
         if Path(fmu).is_file():
             self._own = tempfile.mkdtemp(prefix="fmu-")
-            folder = extract(folder, self._own)
-        super().__init__(name, folder, read_description(name, folder))
+            self.folder = extract(self.folder, self._own)
+        self.description = read_description(name, self.folder)
+        super().__init__(name, self.folder, self.description)
         self.time = 0.0
 
     def start(self, time: float = 0.0, **values: Any) -> Instance:
@@ -192,6 +193,8 @@ def plot(path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequen
     Path
         The PNG file.
     """
+    from percussion_model.interface.plotting.style import save_png
+
     missing = {name for _, _, *names in panels for name in names} - found.keys()
     if missing:
         raise ScenarioError(f"the FMU has no output {min(missing)}")
@@ -202,7 +205,7 @@ def plot(path: Path, title: str, found: Mapping[str, np.ndarray], panels: Sequen
             ax.plot(found["time"], float(factor) * found[name], linewidth=1.2, label=name)
         if len(names) > 1:
             ax.legend(loc="upper right")
-    return save_png(figure, path)
+    return save_png(figure, path, 110)
 
 
 def command_line(

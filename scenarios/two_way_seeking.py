@@ -16,7 +16,7 @@ from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.progress import progress
 from percussion_model.simulation.uncertain import with_error
 
-from .drawing import in_style, save_png
+from .drawing import in_style
 from .extremum_seeking import (
     ABOUT_STEP,
     BOUND,
@@ -126,7 +126,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     """Draw the hill from above with the ways up, and both centres over time."""
     from matplotlib.figure import Figure
 
-    from percussion_model.interface.plotting.style import head, label
+    from percussion_model.interface.plotting.style import head, label, save_png
 
     top, _ = top_of(hill)
     feeds, pressures = _axes(hill)
@@ -158,7 +158,7 @@ def draw(hill: np.ndarray, runs: Sequence[CoupledRun], path: Path) -> Path:
     head(figure, "Extremum seeking on feed and pressure at once")
     handles, labels = above.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
-    return save_png(figure, path)
+    return save_png(figure, path, 110)
 
 
 def main(paths: Sequence[Path], folder: Path) -> list[Path]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from copy import copy
 from typing import Any
 
 from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
@@ -30,6 +29,7 @@ class DrillController(Model):
     pressure: float
     jam_time: float
     speed: float
+    seeker: Seeker
     STATE = tuple(__annotations__)
 
     def __init__(self, parameters: dict[str, Any]) -> None:
@@ -164,11 +164,6 @@ class DrillController(Model):
             "seek.pressure_gradient": self.seeker.gradients[PRESSURE],
         }
 
-    def save(self) -> dict[str, Any]:
-        """State of controller and seeker."""
-        seeker = {name: copy(getattr(self.seeker, name)) for name in Seeker.STATE}
-        return super().save() | {"seeker": seeker}
-
     def state_fault(self, saved: Mapping[str, Any]) -> str:
         """As in `Model`: modes and lengths of lists."""
         if saved["mode"] not in (DRILLING, VOID, RETRACT):
@@ -178,12 +173,6 @@ class DrillController(Model):
             if isinstance(own, list) and len(value) != len(own):
                 return f"{len(value)} numbers in {name}, which must be {len(own)}"
         return ""
-
-    def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a state, which is right."""
-        super().restore(saved)
-        for name, value in saved["seeker"].items():
-            setattr(self.seeker, name, copy(value))
 
 
 DrillControllerPart = slave_of(DrillController)

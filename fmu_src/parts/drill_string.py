@@ -19,9 +19,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from fmu_src.parts.part import COUNT, Model, PartTable, plain, slave_of
+from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
 from fmu_src.parts.string_body import Lumps
 from fmu_src.parts.string_waves import Waves
 
@@ -72,14 +70,15 @@ class DrillString(Model):
     bit_impulse: float
     loaded: float
     time: float
+    body: Any
     STATE = tuple(__annotations__)
 
     def __init__(self, parameters: dict[str, Any]) -> None:
         super().__init__(parameters)
-        kind = {"waves": Waves, "lumped": Lumps}[parameters["model"]]
-        self.body: Any = kind(parameters, int(parameters["start.rods"]))
         for name in self.STATE:
             setattr(self, name, 0.0)
+        kind = {"waves": Waves, "lumped": Lumps}[parameters["model"]]
+        self.body = kind(parameters, int(parameters["start.rods"]))
         self.was_asked = False
         self._share = 0.0, 0.0  # of a step that the filter of the feed lets through
         self._allowed = 0.0, (0.0, 0.0)  # stiffness and damping of the shoulder for a step [s]
@@ -234,11 +233,6 @@ class DrillString(Model):
             "rod_count": int(body.count),
         }
 
-    def save(self) -> dict[str, Any]:
-        """State of shoulder and body."""
-        body = {name: plain(getattr(self.body, name)) for name in self.body.STATE}
-        return super().save() | {"body": body}
-
     def state_fault(self, saved: Mapping[str, Any]) -> str:
         """As in `Model`: the number of rods, what is divided by, and a lag within a cell."""
         body, count = saved["body"], saved["body"]["count"]
@@ -256,8 +250,6 @@ class DrillString(Model):
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a state, which is right."""
         super().restore(saved)
-        for name, value in saved["body"].items():
-            setattr(self.body, name, np.array(value, float) if isinstance(value, list) else value)
         if isinstance(self.body, Lumps):
             self.body.assemble()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any, ClassVar
@@ -27,7 +28,8 @@ class Model:
     Attributes
     ----------
     STATE : tuple of str
-        Attributes that change in a step: numbers, flags, or lists of numbers.
+        Attributes that change in a step: numbers, flags, lists of numbers, or objects that have
+        a `STATE` themselves.
     """
 
     STATE: ClassVar[tuple[str, ...]] = ()
@@ -52,7 +54,7 @@ class Model:
 
     def save(self) -> dict[str, Any]:
         """State as plain values; `restore` takes them back."""
-        return {name: plain(getattr(self, name)) for name in self.STATE}
+        return dict(plain(self))
 
     def state_fault(self, saved: Mapping[str, Any]) -> str:
         """What is wrong with a state from outside, which is of the right form; empty: nothing."""
@@ -60,8 +62,7 @@ class Model:
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a state, which is right."""
-        for name in self.STATE:
-            setattr(self, name, saved[name])
+        _restore(self, saved)
 
 
 # Numbers in SI stay below this, so that no product of a few of them overflows.
@@ -95,8 +96,19 @@ def _is_number(value: Any) -> bool:
 
 
 def plain(value: Any) -> Any:
-    """A number, or a list of numbers, as JSON writes it."""
-    return value.tolist() if hasattr(value, "tolist") else value
+    """A number, a list of numbers, or the state of an object, as JSON writes it; a copy."""
+    if hasattr(value, "STATE"):
+        return {name: plain(getattr(value, name)) for name in value.STATE}
+    return value.tolist() if hasattr(value, "tolist") else copy(value)
+
+
+def _restore(owner: Any, saved: Mapping[str, Any]) -> None:
+    """Set what `plain` gave of an object."""
+    for name in owner.STATE:
+        if isinstance(saved[name], dict):
+            _restore(getattr(owner, name), saved[name])
+        else:
+            setattr(owner, name, copy(saved[name]))
 
 
 class Part(Slave):

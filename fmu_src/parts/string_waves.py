@@ -61,7 +61,8 @@ class Waves(Rods):
         return self._now[0]
 
     @ring.setter
-    def ring(self, waves: np.ndarray) -> None:
+    def ring(self, waves: np.ndarray | Sequence[float]) -> None:
+        waves = np.asarray(waves, float)
         # two rings, from one to the other at each shift, and back to front
         self._now, self._next = ((ring, ring[::-1]) for ring in (waves, np.empty_like(waves)))
         self._room = np.empty_like(waves)

@@ -196,23 +196,25 @@ def judge_run(
     shorter = _round_down(min(steps_that_do)) if steps_that_do else None
     said = "; ".join(one.text for one in findings)
     if error:
+        word = "ended early"
         text = f"the run ended early, {error}" + (f"; {said}" if said else "")
-        return Verdict("ended early", text, shorter, findings, remarks, numbers)
-    if shorter is not None:
+    elif shorter is not None:
+        word = "step too long"
         text = f"the communication step of {_ms(step)} is too long: {said}"
         text += f". At most {_ms(shorter)} will do"
-        return Verdict("step too long", text, shorter, findings, remarks, numbers)
-    if findings:
-        return Verdict("not balanced", said, None, findings, remarks, numbers)
-    if steps < FEWEST_STEPS:
+    elif findings:
+        word, text = "not balanced", said
+    elif steps < FEWEST_STEPS:
+        word = "undecided"
         text = f"{steps} steps are too few to judge by: at least {FEWEST_STEPS} are needed"
-        return Verdict("undecided", text, None, [], remarks, numbers)
-    if not numbers:
+    elif not numbers:
+        word = "undecided"
         text = "no part keeps a balance and none exchange real numbers, so nothing can be told"
-        return Verdict("undecided", text, None, [], remarks, numbers)
-    size = f"steps of at most {_ms(step)} are" if controlled else f"step of {_ms(step)} is"
-    text = f"the communication {size} short enough: {_praise(numbers)}"
-    return Verdict("balanced", text, None, [], remarks, numbers)
+    else:
+        word = "balanced"
+        size = f"steps of at most {_ms(step)} are" if controlled else f"step of {_ms(step)} is"
+        text = f"the communication {size} short enough: {_praise(numbers)}"
+    return Verdict(word, text, shorter, findings, remarks, numbers)
 
 
 _BALANCES = ("string_energy_residual", "hammer_energy_residual", "shoulder_by_blows")

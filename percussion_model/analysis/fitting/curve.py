@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import geometric_mean
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -177,15 +178,10 @@ def first_sight(curves: Sequence[Curve], scene: Scene) -> Sight:
     if scene.effects.rock == "power":
         return _first_sight_by_power(curves, peaks, [one[2] for one in lines], scene)
     rock = {
-        "rock.loading_stiffness": _mean([one[0] for one in lines]),
-        "rock.unloading_ratio": _mean([one[2] / one[0] for one in lines]),
+        "rock.loading_stiffness": geometric_mean([one[0] for one in lines]),
+        "rock.unloading_ratio": geometric_mean([one[2] / one[0] for one in lines]),
     }
     return Sight(rock, [(-one[1] / one[0], peak) for one, peak in zip(lines, peaks, strict=True)])
-
-
-def _mean(values: Sequence[float]) -> float:
-    """Geometric mean."""
-    return math.exp(math.fsum(map(math.log, values)) / len(values))
 
 
 def _first_sight_by_power(
@@ -196,7 +192,7 @@ def _first_sight_by_power(
     left = sum(np.array([one[2] for one in row]) for row in tried)
     k = int(np.argmin(left))
     n, place = float(TRIED_EXPONENTS[k]), scene.rock.reference_penetration
-    factor = _mean([row[k][0] for row in tried])
+    factor = geometric_mean([row[k][0] for row in tried])
     places = [(row[k][1], peak) for row, peak in zip(tried, peaks, strict=True)]
     forces, ratios = [], []
     for slope, (datum, peak) in zip(slopes, places, strict=True):

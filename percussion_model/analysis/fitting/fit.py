@@ -51,12 +51,15 @@ from percussion_model.analysis.fitting.measurements import (
 from percussion_model.analysis.fitting.notes import (
     UNSETTLED,
     correlation_note,
+    distrusted,
     gap_notes,
     grid_notes,
     interval_notes,
     kept_notes,
     rival_notes,
     rough_notes,
+    sensor_notes,
+    sensors_of,
 )
 from percussion_model.analysis.fitting.sampling import (
     Explored,
@@ -76,7 +79,6 @@ from percussion_model.analysis.fitting.search import (
 )
 from percussion_model.analysis.fitting.single import solved
 from percussion_model.analysis.fitting.survey import Counter, minima_of, series_of
-from percussion_model.analysis.fitting.trust import distrusted, sensor_notes, sensors_of
 from percussion_model.scene.scene import Scene
 
 # What can be fitted, and where it is searched; SI units.

@@ -207,35 +207,24 @@ class Study:
 
     def to_xarray(self) -> xarray.Dataset:
         """Numbers found over the axes of the grid, or over the points; units as attributes."""
-        from xarray import DataArray, Dataset
+        from xarray import Dataset
 
-        points, names = self.points, self.rows.dtype.names or ()
-        units = {key: self.scene.row_of(key).unit for key in points.keys}
-        if points.is_grid:
-            mesh = points.values.reshape(*points.shape, len(points.keys))
-            columns = [np.moveaxis(mesh[..., k], k, 0).reshape(n, -1)[:, 0]
-                       for k, n in enumerate(points.shape)]  # fmt: skip
-            dims = points.keys
-        else:
-            columns, dims = list(points.values.T), ("point",)
-        coords = {
-            key: DataArray(
-                column, dims=key if points.is_grid else dims, attrs={"units": units[key]}
-            )
-            for key, column in zip(points.keys, columns, strict=True)
-        }
-        found = {
-            name: DataArray(
-                self.rows[name].reshape(points.shape),
-                dims=dims,
-                attrs={"units": FOUND[name], "error": _error_of(name)} if name in FOUND else {},
-            )
-            for name in names
-        }
+        points = self.points
+        dims = points.keys if points.is_grid else ("point",)
+        columns = {name: self.rows[name] for name in self.rows.dtype.names or ()}
+        columns |= {"undecided": self.undecided, "failure": np.array(self.failures)}
+        found = Dataset(
+            {name: (dims, column.reshape(points.shape)) for name, column in columns.items()},
+            attrs={"title": self.scene.title, "scene": self.scene.to_toml()},
+        )
+        for key, column in zip(points.keys, points.values.T, strict=True):
+            units = {"units": self.scene.row_of(key).unit}
+            axis = (key, np.unique(column)) if points.is_grid else (dims, column)
+            found.coords[key] = (*axis, units)
+        for name, unit in FOUND.items():
+            found[name].attrs |= {"units": unit, "error": _error_of(name)}
         found["kind"].attrs["meaning"] = ", ".join(f"{k}: {kind}" for k, kind in enumerate(KINDS))
-        found["undecided"] = DataArray(self.undecided.reshape(points.shape), dims=dims)
-        found["failure"] = DataArray(np.array(self.failures).reshape(points.shape), dims=dims)
-        return Dataset(found, coords, {"title": self.scene.title, "scene": self.scene.to_toml()})
+        return found
 
 
 def study(

@@ -16,10 +16,10 @@ from percussion_model.analysis.fitting import DropTest, FitError, Reading, fit_r
 from percussion_model.analysis.fitting.found import Explained, SensorEstimate
 from percussion_model.analysis.fitting.likelihood import Likelihood, drop_series
 from percussion_model.analysis.fitting.measurements import checked_drop
+from percussion_model.analysis.fitting.notes import is_explained
 from percussion_model.analysis.fitting.predictions import drop_test_signal, predicted_reading
 from percussion_model.analysis.fitting.search import descend
 from percussion_model.analysis.fitting.sensor import DropSensor
-from percussion_model.analysis.fitting.trust import is_explained
 from percussion_model.interface.measured_files import read_drop, read_reading
 
 HERE = Path(__file__).parent
