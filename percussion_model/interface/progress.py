@@ -45,13 +45,17 @@ class Lines:
         What it does.
     clock : callable
         Gives the time [s].
+    done : float
+        Share that is done already.
     """
 
-    def __init__(self, text: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, text: str, clock: Callable[[], float] = time.monotonic, done: float = 0.0
+    ) -> None:
         self.clock = clock
         self.started = clock()
         self.aside: float | None = None  # since when what has no share is done
-        self.begin(text)
+        self.begin(text, done)
 
     def begin(self, text: str, done: float = 0.0) -> None:
         """Take what begins now, and the share that is done already."""
@@ -138,8 +142,7 @@ def lines(text: str, done: float = 0.0) -> Iterator[Report]:
         finally:
             outer.told, outer.marks, outer.changed, outer.aside = before
         return
-    own = Lines(text)
-    own.begin(text, done)
+    own = Lines(text, done=done)
     over = threading.Event()
     said = _silent_since(own.started)
     thread = threading.Thread(target=_print, args=(own, over, said), daemon=True)
@@ -258,8 +261,7 @@ def progress(text: str, done: float = 0.0) -> Iterator[Report]:
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
     from rich.text import Text
 
-    told = Lines(text)
-    told.begin(text, done)
+    told = Lines(text, done=done)
 
     class Left(ProgressColumn):
         """The time that is left, in the words of the lines."""

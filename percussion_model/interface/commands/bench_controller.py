@@ -50,10 +50,8 @@ def bench_controller(
     """Put a controller of feed and pressure through standard runs: scores, figures, a page."""
     from percussion_model.interface.progress import progress, progress_bar
 
-    try:
+    with common.needing("fmu"):
         from percussion_model.coupling.bench import STEP, bench, mean_points, mean_points_error
-    except ImportError as error:
-        return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
     source = None if controller is None else Path(_file_and_name(controller)[0])

@@ -101,11 +101,9 @@ def couple(
     """
     from percussion_model.interface.progress import progress, progress_bar
 
-    try:
+    with common.needing("fmu"):
         from percussion_model.coupling import Coupling
         from percussion_model.coupling.coupled_run import known_signals, summary
-    except ImportError as error:
-        return common.print_message(common.needs_extra(error, "fmu"), common.BAD_INPUT)
     common.check_json(json_file)
     coupling = Coupling(
         system,

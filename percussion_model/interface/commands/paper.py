@@ -106,7 +106,8 @@ def _compute(scene: Scene, processes: int | None, written: _Written) -> list[Sta
     from percussion_model.verification.paper.rock_law import run_sinking
     from percussion_model.verification.paper.runs import SWEEPS, run_drops
 
-    part = _parts(4 + len(SWEEPS))
+    count = 4 + len(SWEEPS)
+    part = (f"part {k} of {count}" for k in range(1, count + 1))
     here = next(part)
     with progress(f"{here}, drop tests and sinking, figure 6"):
         drops, sinking = run_drops(scene), run_sinking(scene)
@@ -115,13 +116,8 @@ def _compute(scene: Scene, processes: int | None, written: _Written) -> list[Sta
     )
     sweeps = _sweeps(written, processes, part)
     here = next(part)
-    written.draw(
-        here,
-        {
-            "figure9": lambda: draw_sweeps(sweeps),
-            "scaling": lambda: draw_scaling(sweeps["d"]),
-        },
-    )
+    scaled = {"figure9": lambda: draw_sweeps(sweeps), "scaling": lambda: draw_scaling(sweeps["d"])}
+    written.draw(here, scaled)
     with progress_bar(2 * scene.run.duration) as bar:
         bar.stage(f"{here}, figures 7 and 8", bar.end)
         both = compare(scene, ("wave", "fem"), progress=bar)
@@ -162,11 +158,6 @@ def _statements(
         yield from section_4.about_cycle(result, window.samples, window.origin)
         yield from section_4.about_double_impact(drops, result, window.samples, window.origin)
     yield from section_4.about_sweeps(sweeps)
-
-
-def _parts(count: int) -> Iterator[str]:
-    """Names of the parts of the work, one after the other."""
-    return (f"part {k} of {count}" for k in range(1, count + 1))
 
 
 def _sweeps(written: _Written, processes: int | None, part: Iterator[str]) -> dict[str, Study]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -17,13 +16,6 @@ if TYPE_CHECKING:
     from percussion_model.simulation.result import Result
 
 _NEW_TITLE = "A down-the-hole hammer"
-
-
-class Kind(StrEnum):
-    """What a new scene is."""
-
-    HAMMER = "hammer"
-    HOPKINSON = "hopkinson"
 
 
 def run(
@@ -209,8 +201,9 @@ def new(
         int | None, typer.Option("--rods", help="Rods of a top hammer, from 1 on; default 4.")
     ] = None,
     kind: Annotated[
-        Kind, typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock.")
-    ] = Kind.HAMMER,
+        Literal["hammer", "hopkinson"],
+        typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock."),
+    ] = "hammer",
     rock: common.RockName = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
@@ -221,7 +214,7 @@ def new(
 
     common.refuse_existing(file, force)
     common.check_file("FILE", file)
-    if kind == Kind.HOPKINSON:
+    if kind == "hopkinson":
         if hammer is not None or rods is not None:
             raise common.refusal("--kind hopkinson has no --hammer and no --rods")
         scene = bar_test()

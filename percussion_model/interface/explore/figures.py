@@ -12,7 +12,7 @@ from bokeh.palettes import interp_palette
 from percussion_model.interface.explore.response import Response
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.interactive import panel
-from percussion_model.interface.plotting.interactive_run import STRESS_COLOURS, image_rows
+from percussion_model.interface.plotting.interactive_run import STRESS_COLOURS, image_columns
 from percussion_model.interface.plotting.style import KN, MM, MPA, MS, US
 from percussion_model.interface.plotting.window import Window
 from percussion_model.physics.records import Mode
@@ -41,7 +41,7 @@ class Figures:
 
     def __init__(self) -> None:
         self.mapper = LinearColorMapper(interp_palette(STRESS_COLOURS, 255), low=-1.0, high=1.0)
-        self.images = ColumnDataSource({name: [] for name in ("image", "x", "y", "dw", "dh")})
+        self.images = ColumnDataSource(image_columns({})[0])
         self.border, self.closed = _pairs(), _pairs()
         self.stress = self._stress()
         self.contact, self.force, self.path = _line(), _by_mode(), _by_mode()
@@ -125,18 +125,8 @@ class Figures:
 
     def _draw_stress(self, response: Response) -> None:
         fields, window = response.fields, response.window
-        images: dict[str, list[Any]] = {name: [] for name in ("image", "x", "y", "dw", "dh")}
-        top, borders, closed = 0.0, [], []
-        for one in fields.values():
-            first, last = float(one.time_edges[0]) * US, float(one.time_edges[-1]) * US
-            depth = float(one.depth_edges[-1]) * MM
-            values = (one.stress[image_rows(one)] / MPA).astype(np.float32)
-            row = values, first, top, last - first, depth
-            for name, value in zip(images, row, strict=True):
-                images[name].append(value)
-            top += depth
-            borders.append(top)
-        self.images.data = images
+        self.images.data, ends = image_columns(fields)
+        closed = []
         if fields and window is not None:
             limit = max(float(np.abs(one.stress).max(initial=0.0)) for one in fields.values())
             _, limit = _rounded(0.0, limit / MPA or 1.0)
@@ -144,20 +134,16 @@ class Figures:
                 self.mapper.update(low=-limit, high=limit)
             end = float(next(iter(fields.values())).time_edges[-1]) * US
             _move(self.stress.x_range, 0.0, end)
-            _move(self.stress.y_range, top, 0.0)
+            _move(self.stress.y_range, ends[-1], 0.0)
             closed = [(a * US, min(b * US, end)) for a, b in window.contacts if a * US < end]
-        inner = borders[:-1]
+        inner, time = ends[:-1], self.stress.x_range
         self.border.data = {
-            "x": [self.stress_width() for _ in inner], "y": [[at, at] for at in inner]
+            "x": [[time.start, time.end] for _ in inner], "y": [[at, at] for at in inner]
         }  # fmt: skip
         self.closed.data = {
             "x": [list(pair) for pair in closed for _ in inner],
             "y": [[at, at] for _ in closed for at in inner],
         }
-
-    def stress_width(self) -> list[float]:
-        """Start and end of the time axis of the stress [µs]."""
-        return [self.stress.x_range.start, self.stress.x_range.end]
 
 
 def _columns(x: np.ndarray, y: np.ndarray) -> dict[str, np.ndarray]:

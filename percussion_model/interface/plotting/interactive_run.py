@@ -10,6 +10,7 @@ from bokeh.models import (
     BasicTicker,
     BoxAnnotation,
     ColorBar,
+    ColumnDataSource,
     HoverTool,
     LayoutDOM,
     LinearColorMapper,
@@ -185,19 +186,19 @@ def _stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
     mapper = LinearColorMapper(
         interp_palette(STRESS_COLOURS, 255), low=-limit / MPA, high=limit / MPA
     )
-    depth = sum(float(field.depth_edges[-1]) for field in fields.values()) * MM
+    images, ends = image_columns(fields)
     names = " and ".join(fields)
     upper = panel(f"Axial stress in {names} — {window.name}", "", "depth below the top [mm]",
-                  x_range=shared, y_range=Range1d(depth, 0.0), height=380)  # fmt: skip
+                  x_range=shared, y_range=Range1d(ends[-1], 0.0), height=380)  # fmt: skip
     contacts = [(start * US, min(stop * US, end)) for start, stop in window.contacts
                 if start * US < end]  # fmt: skip
-    top = 0.0
-    for field in fields.values():
-        top = _image(upper, field, top, mapper)
-        if top < depth * (1.0 - 1e-9):
-            rule(upper, top, "black")
-            for stretch in contacts:
-                upper.line(stretch, (top, top), color="black", line_width=3)
+    drawn = upper.image(*images, source=ColumnDataSource(images), color_mapper=mapper)
+    told = [("time", "$x{0.0} µs"), ("depth", "$y{0.0} mm"), ("stress", "@image{0.0} MPa")]
+    upper.add_tools(HoverTool(renderers=[drawn], tooltips=told))
+    for border in ends[:-1]:
+        rule(upper, border, "black")
+        for stretch in contacts:
+            upper.line(stretch, (border, border), color="black", line_width=3)
     upper.add_layout(
         ColorBar(color_mapper=mapper, title="MPa, compression positive", width=12), "right"
     )
@@ -216,19 +217,23 @@ def _stress(window: Window, fields: dict[str, StressField]) -> LayoutDOM:
     return column(upper, lower, sizing_mode="stretch_width")
 
 
-def _image(to: Any, field: StressField, top: float, mapper: LinearColorMapper) -> float:
-    """Draw the stress in one bar below `top` [mm]; return where it ends."""
-    edges = field.depth_edges
-    values = (field.stress[image_rows(field)] / MPA).astype(np.float32)
-    first, last = field.time_edges[0] * US, field.time_edges[-1] * US
-    drawn = to.image([values], x=[first], y=[top], dw=[last - first], dh=[edges[-1] * MM],
-                     color_mapper=mapper)  # fmt: skip
-    shown = [("time", "$x{0.0} µs"), ("depth", "$y{0.0} mm"), ("stress", "@image{0.0} MPa")]
-    to.add_tools(HoverTool(renderers=[drawn], tooltips=shown))
-    return float(top + edges[-1] * MM)
+def image_columns(fields: dict[str, StressField]) -> tuple[dict[str, list[Any]], list[float]]:
+    """Columns of the images of bars, one below the other [µs], [mm], [MPa], and their ends [mm]."""
+    columns: dict[str, list[Any]] = {name: [] for name in ("image", "x", "y", "dw", "dh")}
+    top, ends = 0.0, []
+    for one in fields.values():
+        values = (one.stress[_image_rows(one)] / MPA).astype(np.float32)
+        first, last = float(one.time_edges[0]) * US, float(one.time_edges[-1]) * US
+        depth = float(one.depth_edges[-1]) * MM
+        row = values, first, top, last - first, depth
+        for values_of, value in zip(columns.values(), row, strict=True):
+            values_of.append(value)
+        top += depth
+        ends.append(top)
+    return columns, ends
 
 
-def image_rows(field: StressField) -> np.ndarray:
+def _image_rows(field: StressField) -> np.ndarray:
     """Cell of each row of pixels: rows are alike in height, cells need not be."""
     edges, heights = field.depth_edges, np.diff(field.depth_edges)
     if np.ptp(heights) <= 1e-6 * heights.mean():

@@ -95,7 +95,7 @@ def _thinned(count: int) -> np.ndarray:
 def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     """What is shown over each parameter; points chosen in one panel stand out in all."""
     kept = _thinned(len(found.points))
-    kinds = [KINDS[kind] for kind in found.rows["kind"][kept].tolist()]
+    kinds = _motions(found, kept)
     undecided = found.undecided[kept]
     shared = ColumnDataSource(
         {
@@ -146,7 +146,7 @@ def _scatter(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
 def _table(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     """Points and numbers found; a click on a heading sorts."""
     kept = _thinned(len(found.points))
-    data: dict[str, Any] = {"kind": [KINDS[kind] for kind in found.rows["kind"][kept].tolist()]}
+    data: dict[str, Any] = {"kind": _motions(found, kept)}
     shown = []
     for k, key in enumerate(found.points.keys):
         data[f"at{k}"] = found.points.values[kept, k]
@@ -181,6 +181,11 @@ def _bars(columns: dict[str, np.ndarray], kept: np.ndarray) -> dict[str, np.ndar
     """Ends of the error bars of the rate."""
     rate, off = columns["rate"][kept], np.nan_to_num(columns["off"][kept])
     return {"lower": rate - off, "upper": rate + off}
+
+
+def _motions(found: Study, kept: np.ndarray) -> list[str]:
+    """Words for the kinds of motion."""
+    return np.array(KINDS)[found.rows["kind"][kept]].tolist()
 
 
 def _rates(found: Study, kept: np.ndarray) -> list[str]:
@@ -276,9 +281,7 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     offset = (
         np.arange(len(y.values))[:, None] * y.stride + np.arange(len(x.values))[None, :] * x.stride
     )
-    kinds, undecided = found.rows["kind"], found.undecided
-    texts = _rates(found, np.arange(len(found.points)))
-    cells = _cells(x, y, offset, columns, kinds, undecided, base, texts)
+    undecided, cells = found.undecided, _cells(x, y, base + offset, base, columns, found)
     rows = len(y.values)
     shown = sorted({int(k) for k in np.linspace(0, rows - 1, min(rows, MOST_LINES)).round()})
     lines = ColumnDataSource(
@@ -320,8 +323,8 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     sliders = [_slider(axis) for axis in others]
     everything = ColumnDataSource(
         {
-            **columns, "rate_text": texts,
-            "kind": kinds.astype(np.int32), "hidden": undecided.astype(np.int32),
+            **columns, "rate_text": _rates(found, np.arange(len(found.points))),
+            "kind": found.rows["kind"].astype(np.int32), "hidden": undecided.astype(np.int32),
         }
     )  # fmt: skip
     names = _titles()
@@ -384,30 +387,23 @@ lines.change.emit();
 
 
 def _cells(
-    x: Axis,
-    y: Axis,
-    offset: np.ndarray,
-    columns: dict[str, np.ndarray],
-    kinds: np.ndarray,
-    undecided: np.ndarray,
-    base: int,
-    texts: list[str],
+    x: Axis, y: Axis, at: np.ndarray, base: int, columns: dict[str, np.ndarray], found: Study
 ) -> ColumnDataSource:
     """Cells of a map, row by row from the lowest value of the vertical axis on."""
     across, up = len(x.values), len(y.values)
-    at = base + offset.ravel()
+    at, undecided = at.ravel(), found.undecided
     return ColumnDataSource(
         {
             "left": np.tile(x.edges[:-1], up), "right": np.tile(x.edges[1:], up),
             "bottom": np.repeat(y.edges[:-1], across), "top": np.repeat(y.edges[1:], across),
             "x": np.tile(x.values, up), "y": np.repeat(y.values, across),
-            "offset": offset.ravel().astype(np.int32),
+            "offset": (at - base).astype(np.int32),
             "value": _seen(columns["rate"], undecided)[at],
             "grey": undecided[at].astype(np.float32),
-            "rate_text": [texts[k] for k in at.tolist()],
+            "rate_text": _rates(found, at),
             "verdict": np.where(undecided[at], UNDECIDED, "").tolist(),
-            "motion": [KINDS[kind] for kind in kinds[at].tolist()],
-            "mark": np.where(kinds[at] == KINDS.index("periodic"), 0.0, 6.0),
+            "motion": _motions(found, at),
+            "mark": np.where(found.rows["kind"][at] == KINDS.index("periodic"), 0.0, 6.0),
         },
         name="cells",
     )  # fmt: skip
