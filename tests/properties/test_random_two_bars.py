@@ -11,8 +11,6 @@ from tests.properties.scenes import draw_case
 from tests.properties.source import Generator
 
 SEED, COUNT, GROUPS = 47, 75, 4
-# Sections that are shorter than a step have the mass of one.
-FITS = 1e-9
 
 
 def by_waves(index):
@@ -22,9 +20,10 @@ def by_waves(index):
         return None
     case.scene = case.scene.computed_by("wave")
     try:
-        return case if make_solver(case.scene).wave_speed_error < FITS else None
+        make_solver(case.scene)
     except SceneError:  # too much loss for short sections
         return None
+    return case
 
 
 @pytest.mark.parametrize("group", range(GROUPS))
