@@ -186,7 +186,7 @@ def _in_accuracy(v: Any) -> Rule:
     if v.piston_model == PISTON_ABSENT:
         return Rule.ACCURACY_WITHOUT_PISTON
     # rigid bodies have no waves, that lose or lose not
-    if v.bit_model == ELASTIC and v.solver_fidelity == WAVE:
+    if v.bit_model == ELASTIC and v.solver_fidelity == BY_WAVES:
         if not v.effects_loss:
             return Rule.ACCURACY_WITHOUT_LOSS
         if not v.loss_time > 0.0:
