@@ -32,8 +32,7 @@ BARRIER_FROM = 100
 MESHES = ((60, 0.9), (60, 0.6), (90, 0.6))
 # Modes of another witness, where there are tables for as many.
 FINE = 112
-# Steps of waves in the piston for rock that elements do not carry: the best; half of them tell
-# how far these are off.
+# Steps of waves where elements do not carry the rock: the best, and how far a half of them is off.
 CELLS = 80
 # An error is unsound that is so many times what was stated.
 UNSOUND = 3.0

@@ -155,7 +155,7 @@ def find_fault(base, moving, t, facts):
     if kind == Kind.MODAL:
         return modal.find_fault(base, moving, t, facts)
     if kind == Kind.WAVE:
-        return wave.find_fault(base, moving, facts)
+        return wave.find_fault(base, moving, t, facts)
     if kind == Kind.FEM:
         return fem.find_fault(base, moving, t, facts)
     return rigid.find_fault(moving, t, facts)

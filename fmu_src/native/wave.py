@@ -57,7 +57,9 @@ LOW, HIGH, MAY_BE_NAN, WHOLE = WAVE_LIMITS.rows
 PAR_BYTES = WAVE_PAR.itemsize
 WORK = work_at(WAVE_STATE)  # place of the first array in what moves
 BAR_ROWS, JOINT_ROWS = len(Bar), len(Has)
-PLACES, STEEL, WEIGHTS, FITS, BODIES, BARS, JOINTS, CAME, RINGS = range(9)
+# A state is no more than a step, and rounding, behind the present [steps].
+MOST_BEHIND = 2.0
+PLACES, STEEL, WEIGHTS, PASSAGE, FITS, BODIES, BARS, JOINTS, CAME, RINGS = range(10)
 
 
 @viewing
@@ -66,7 +68,7 @@ def chain_of(base):
     d = directory(base)
     return Chain(
         words_2(base, d, PLACES), floats_2(base, d, STEEL), floats_2(base, d, WEIGHTS),
-        floats_2(base, d, FITS), floats_2(base, d, BODIES),
+        floats_2(base, d, PASSAGE), floats_2(base, d, FITS), floats_2(base, d, BODIES),
     )  # fmt: skip
 
 
@@ -107,7 +109,7 @@ def create(numbers, bar, place):
     chain = network.chain
     par = np.zeros(1, WAVE_PAR)
     fill_wave_parameters(par[0], numbers, plan, network)
-    arrays = (chain.places, chain.steel, chain.weights, chain.fits, chain.bodies)
+    arrays = (chain.places, chain.steel, chain.weights, chain.passage, chain.fits, chain.bodies)
     bars, joints = len(chain.bodies), max(1, len(chain.fits))
     came = max(len(chain.places), bars)
     joints_at = WORK + lines(8 * BAR_ROWS * bars)
@@ -195,10 +197,13 @@ def stress(base, moving):
 
 
 @preparing
-def find_fault(base, moving, facts):
+def find_fault(base, moving, t, facts):
     """Number of the fault of what moves, from outside; its facts are filled in."""
     number = Fault.WAVE_FIELD.value
     fault = record_fault(moving, LOW, HIGH, MAY_BE_NAN, WHOLE, number, facts)
     if fault > 0:
         return fault
-    return 0 if arrays_are_bounded(base, moving, BARS, 4) else Fault.WORKSPACE.value
+    if not arrays_are_bounded(base, moving, BARS, 4):
+        return Fault.WORKSPACE.value
+    facts[0], facts[1] = state_time(base, moving), t
+    return 0 if facts[0] >= t - MOST_BEHIND * parameters(base)[0].dt else Fault.BEHIND.value

@@ -39,7 +39,7 @@ LONG = os.environ.get("PERCUSSION_LONG") == "1"
 # Share of each case's duration: enough for a blow or two, and for the first storm.
 SHARES = {"wave": 0.15, "modal": 0.15, "fem": 0.08, "rigid": 0.12}
 # Too dear for every run of the suite, at any length.
-DEAR = {("ratio_50", "fem"), ("fine", "fem"), ("fine", "wave")}
+DEAR = {("ratio_50", "fem"), ("fine", "fem")}
 # The command itself, which says when the first of its runs has ended.
 TALKING = """
 import contextlib, sys

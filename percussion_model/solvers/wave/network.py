@@ -26,8 +26,11 @@ from percussion_model.solvers.wave.resolution import (
     STEPS_OF_TWO,
     steps_for,
 )
-from percussion_model.solvers.wave.taps import WHOLE, turning, weights_of
+from percussion_model.solvers.wave.taps import WHOLE, on_the_way, turning, weights_of
 
+# Bars are lossy at their ends as well where their sections have this share of their loss: the ends
+# of others would make energy.
+LEAST_OF_ENDS = 0.9
 # Where steps are shorter than the Kelvin-Voigt time, sections must have this share of their loss.
 LEAST_SPREAD = 0.99
 # Steps in which a wave crosses any bar at least, where a scene asks for none.
@@ -76,6 +79,8 @@ class Network(NamedTuple):
         Largest relative error of a section's transit time: one shorter than a step.
     struck : int
         The bar that the piston strikes, or the topmost.
+    lossy_ends : int
+        1 where sections have so much of their loss that ends can have theirs.
     too_fine : float
         0 where all is well; length [m] of a section that cannot spread a wave as the loss would
         in steps so short. The rest is then not finished.
@@ -85,6 +90,7 @@ class Network(NamedTuple):
     rings: int
     misfit: float
     struck: int
+    lossy_ends: int
     too_fine: float
 
 
@@ -248,8 +254,9 @@ def network_of(numbers, plan):
     places, steel = np.zeros((count, PLACES), np.int64), np.zeros((count, STEELS))
     bodies, weights = np.zeros((bars, BODIES)), np.zeros((1, 64))
     ring, used, misfit, k, too_fine = 0, 0, 0.0, 0, 0.0
+    passage, passed, lossy_ends = np.zeros((1, 64)), 0, 1
     for bar in range(bars):
-        begin = k
+        begin, spread, all_wanted = k, 0.0, 0.0
         for _ in range(plan.counts[bar]):
             section = plan.sections[k]
             transit = section_transit_time(section) / dt
@@ -261,6 +268,11 @@ def network_of(numbers, plan):
             _fill_place(places[k], bar, ring, cut, used)
             weights = _appended(weights, used, cut.row)
             used += len(cut.row)
+            spread, all_wanted = spread + cut.spread, all_wanted + wanted
+            row, reach = on_the_way(places[k, Place.CELLS], cut.spread / transit)
+            places[k, Place.PASSAGE], places[k, Place.REACH] = passed, reach
+            passage = _appended(passage, passed, row)
+            passed += len(row)
             ring += 4 * places[k, Place.SIZE] + 2
             loss = 1.0 if eta > 0.0 else 0.0
             if cut.spread > wanted:  # the rest is what fitting a short section to steps takes
@@ -275,13 +287,21 @@ def network_of(numbers, plan):
             k += 1
         bodies[bar, Body.FIRST], bodies[bar, Body.LAST] = begin, k - 1
         bodies[bar, Body.INV_MASS] = 1.0 / bodies[bar, Body.MASS]
+        if spread < LEAST_OF_ENDS * all_wanted:
+            lossy_ends = 0
     struck = int(first_is_piston(numbers))
     fits = _fits(numbers, steel, bodies[struck:])
-    own = np.zeros((1, used))
-    for i in range(used):
-        own[0, i] = weights[0, i]
-    chain = Chain(places, steel, own, fits, bodies)
-    return Network(chain, ring, misfit, struck, too_fine)
+    chain = Chain(places, steel, _first(weights, used), _first(passage, passed), fits, bodies)
+    return Network(chain, ring, misfit, struck, lossy_ends, too_fine)
+
+
+@preparing
+def _first(row, count):
+    """The first numbers of a row, in an array of their own."""
+    own = np.zeros((1, count))
+    for i in range(count):
+        own[0, i] = row[0, i]
+    return own
 
 
 @preparing

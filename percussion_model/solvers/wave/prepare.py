@@ -25,7 +25,7 @@ def fill_wave_parameters(p, numbers, plan, network):
     values, chain = numbers.values, network.chain
     fill_parameters(p, numbers, True)
     p.dt, p.most_changes = plan.time_step, MOST_CHANGES
-    p.viscous = 0.5 * plan.eta / plan.time_step
+    p.viscous = 0.5 * plan.eta / plan.time_step if network.lossy_ends else 0.0
     p.lag = p.viscous / (1.0 + p.viscous)
     spread = plan.eta * p.rearm_time / REARM_TRANSITS
     p.cuts_all = 1 if spread > WIDE * plan.time_step**2 else 0

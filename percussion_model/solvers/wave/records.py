@@ -26,6 +26,8 @@ class Place(IntEnum):
     TAPS = 4  # how many weights it arrives by
     WEIGHTS = 5  # where these begin; of a wave that arrives as it is -1, of q its two weights
     CELLS = 6  # in which it is read
+    PASSAGE = 7  # where the weights begin by which loss has spread a wave in each cell
+    REACH = 8  # these are of so many steps before and after its own
 
 
 class Steel(IntEnum):
@@ -102,11 +104,15 @@ class Task(IntEnum):
 
 
 class Chain(NamedTuple):
-    """What does not change: rows of `Place`, `Steel`, `Fit`, `Body`; weights of all sections."""
+    """What does not change: rows of `Place`, `Steel`, `Fit`, `Body`; weights of all sections.
+
+    Weights by which waves arrive, and by which they have been spread in the cells on their way.
+    """
 
     places: np.ndarray
     steel: np.ndarray
     weights: np.ndarray
+    passage: np.ndarray
     fits: np.ndarray
     bodies: np.ndarray
 

@@ -8,7 +8,7 @@ from percussion_model.physics.kernel import inlined, kernel, preparing
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, totals
 from percussion_model.solvers.wave.records import Bar, Body, Place, Steel
 
-BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS = (int(row) for row in Place)
+BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS, PASSAGE, REACH = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, CELL_MASS, BY_LOSS, BY_MIXING = (int(row) for row in Steel)
 MASS, FIRST, LAST, INV_MASS = (int(row) for row in Body)
 GIVEN = int(Bar.GIVEN)
@@ -166,11 +166,29 @@ def write_given(chain, waves, bar):
 
 
 @inlined
-def wave_in_cell(places, rings, step, k, way, cell):
-    """A wave of a section in a cell, counted from the top, without what body forces gave."""
+def sent_to_cell(places, rings, step, k, way, cell):
+    """A wave of a section in a cell as it was sent, without what body forces gave."""
     size = places[k, SIZE]
     age = cell if way == 0 else places[k, CELLS] - 1 - cell
     return rings[0, places[k, RING] + 2 * size * way + ((step - age) & (size - 1))]
+
+
+@kernel
+def wave_in_cell(chain, rings, step, k, way, cell):
+    """A wave of a section in a cell, counted from the top, without what body forces gave.
+
+    On its way there loss has spread it, as it does on the whole way through the section.
+    """
+    places, size, reach = chain.places, chain.places[k, SIZE], chain.places[k, REACH]
+    if reach == 0:
+        return sent_to_cell(places, rings, step, k, way, cell)
+    age = cell if way == 0 else places[k, CELLS] - 1 - cell
+    start, wave = places[k, RING] + 2 * size * way, 0.0
+    weight = places[k, PASSAGE] + age * (2 * reach + 1) + reach
+    for j in range(-reach, reach + 1):
+        then = min(max(age + j, 0), size - 1)  # what is still to come is as the newest
+        wave += chain.passage[0, weight + j] * rings[0, start + ((step - then) & (size - 1))]
+    return wave
 
 
 @kernel
@@ -180,9 +198,20 @@ def force_in(chain, rings, step, bar, cell):
     while k < last and cell >= chain.places[k, CELLS]:
         cell -= chain.places[k, CELLS]
         k += 1
-    down = wave_in_cell(chain.places, rings, step, k, 0, cell)
-    up = wave_in_cell(chain.places, rings, step, k, 1, cell)
+    down = wave_in_cell(chain, rings, step, k, 0, cell)
+    up = wave_in_cell(chain, rings, step, k, 1, cell)
     return chain.steel[k, IMPEDANCE] * (down - up)
+
+
+@kernel
+def fill_cells(chain, rings, step, bar, down, up):
+    """Fill in both waves of each cell of a bar, without what body forces gave [m/s]."""
+    at = 0
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        for cell in range(chain.places[k, CELLS]):
+            down[at] = wave_in_cell(chain, rings, step, k, 0, cell)
+            up[at] = wave_in_cell(chain, rings, step, k, 1, cell)
+            at += 1
 
 
 @preparing
@@ -201,14 +230,28 @@ def cell_masses(chain, bar):
 
 
 @kernel
+def kinetic_as_sent(chain, waves, step, bar):
+    """About the kinetic energy of a bar, which is less by what loss takes on the way [J]."""
+    energy, given = 0.0, waves.bars[GIVEN, bar]
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        one = 0.0
+        for cell in range(chain.places[k, CELLS]):
+            v = sent_to_cell(chain.places, waves.rings, step, k, 0, cell)
+            v += sent_to_cell(chain.places, waves.rings, step, k, 1, cell) + 2.0 * given
+            one += v * v
+        energy += 0.5 * chain.steel[k, CELL_MASS] * one
+    return energy
+
+
+@kernel
 def kinetic_of_bar(chain, waves, step, bar):
     """Kinetic energy of a bar [J]."""
     energy, given = 0.0, waves.bars[GIVEN, bar]
     for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
         one = 0.0
         for cell in range(chain.places[k, CELLS]):
-            v = wave_in_cell(chain.places, waves.rings, step, k, 0, cell)
-            v += wave_in_cell(chain.places, waves.rings, step, k, 1, cell) + 2.0 * given
+            v = wave_in_cell(chain, waves.rings, step, k, 0, cell)
+            v += wave_in_cell(chain, waves.rings, step, k, 1, cell) + 2.0 * given
             one += v * v
         energy += 0.5 * chain.steel[k, CELL_MASS] * one
     return energy
@@ -228,8 +271,8 @@ def shortening(dt, chain, waves, step, bar, from_top):
         cells, own = chain.places[k, CELLS], chain.steel[k, CELL_MASS]
         transit = own / chain.steel[k, IMPEDANCE]
         for cell in range(cells):
-            short = wave_in_cell(chain.places, waves.rings, step, k, 0, cell)
-            short -= wave_in_cell(chain.places, waves.rings, step, k, 1, cell)
+            short = wave_in_cell(chain, waves.rings, step, k, 0, cell)
+            short -= wave_in_cell(chain, waves.rings, step, k, 1, cell)
             middle = above + 0.5 * own
             moment += short * transit * (mass - middle if from_top == 1 else middle)
             above += own

@@ -33,7 +33,7 @@ from percussion_model.solvers.wave.records import (
     Waves,
 )
 from percussion_model.solvers.wave.resolution import coarser_steps
-from percussion_model.solvers.wave.sections import CAME_ROWS, cell_masses, force_in
+from percussion_model.solvers.wave.sections import CAME_ROWS, cell_masses, fill_cells, force_in
 
 _WORD = words_of(WAVE_STATE)
 STEP, EVENTS_ON, PEAK_FROM = _WORD["step"], _WORD["events_on"], _WORD["peak_from"]
@@ -41,6 +41,8 @@ T_BASE, N_BLOWS, N_EVENTS = _WORD["t_base"], _WORD["n_blows"], _WORD["n_events"]
 CLOSED, GAP = _WORD["closed"], _WORD["gap"]
 # So many samples at once are read by a kernel of its own, which takes ten seconds to compile.
 MANY = 16
+# A state is no more than a step, and rounding, behind the present [steps].
+MOST_BEHIND = 2.0
 
 
 def _network(numbers: Numbers) -> tuple[Plan, Network]:
@@ -199,6 +201,13 @@ class WaveSolver(Solver):
         self._sample_entry = entry_of(sample)
         return int(status), int(words[N_BLOWS]), int(words[N_EVENTS]), int(count)
 
+    def state_fault(self, state: State, t: float) -> str:
+        """As in `Solver`; the state is within a step of the present."""
+        fault = super().state_fault(state, t)
+        if not fault and not self.time(state) >= t - MOST_BEHIND * self.time_step:
+            return f"its time of {self.time(state)!r} s, far before {t!r} s"
+        return fault
+
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`: a step may be cut at a closure."""
         # as the kernel asks, in a tenth of the time
@@ -225,13 +234,8 @@ class WaveSolver(Solver):
         bars, _, _, rings = state.arrays
         step = int(state.words[STEP])
         for i, name in enumerate(self._names):
-            down, up = [], []
-            for k in range(self._sections[name].start, self._sections[name].stop):
-                ring, size, cells = self._chain.places[k, [Place.RING, Place.SIZE, Place.CELLS]]
-                ages = (step - np.arange(cells)) & (size - 1)
-                down.append(rings[0, ring + ages])
-                up.append(rings[0, ring + 2 * size + ages][::-1])
-            d, u = np.concatenate(down), np.concatenate(up)
+            d, u = np.zeros((2, self._cells[name].n))
+            entry_of(fill_cells)(self._chain, rings, step, i, d, u)
             out[f"{name}_force"] = self._cells[name].impedance * (d - u)
             out[f"{name}_velocity"] = d + u + 2.0 * bars[Bar.GIVEN, i]
         return out

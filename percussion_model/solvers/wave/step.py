@@ -20,6 +20,7 @@ from percussion_model.physics.loads import (
     piston_acceleration,
 )
 from percussion_model.physics.records import Mode, Piston
+from percussion_model.physics.rock import barrier_level
 from percussion_model.solvers.wave.joint import shoulders, yielding
 from percussion_model.solvers.wave.piston import mass_contact, move_piston
 from percussion_model.solvers.wave.records import MOST_CUTS, Bar, Fit, Has, Joint
@@ -39,6 +40,7 @@ from percussion_model.solvers.wave.sections import (
     MASS,
     UP,
     UP_OUT,
+    kinetic_as_sent,
     kinetic_of_bar,
     mixing_in_turns,
     part_of_step,
@@ -56,6 +58,8 @@ CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES, VISCOUS = (int(row)
 SHORTEST_PART = 1e-3
 # Ends that approach each other by no more do not touch: where bars part, it is rounding [m/s].
 REST_APPROACH = 1e-12
+# Where its kinetic energy is below this share of the barrier, a bit stands still without a doubt.
+FAR_BELOW = 0.5
 # Mean motion is derived anew from waves and gap so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
@@ -323,7 +327,9 @@ def meet_rock(par, s, chain, waves, tau, time, events):
     v_whole, energy = 2.0 * down + kick_of(par, waves, bit), 0.0
     v_free, z_v = v_whole - par.lag * s.g_rock / z, z * (1.0 + par.viscous)
     if asks_for_energy(par, s, v_free, z_v, tau):
-        energy = kinetic_of_bar(chain, waves, s.step, bit)
+        energy = kinetic_as_sent(chain, waves, s.step, bit)
+        if energy > FAR_BELOW * barrier_level(par, s):  # to know it costs as much as ten steps
+            energy = kinetic_of_bar(chain, waves, s.step, bit)
     d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
     impulse, up = z_v * (v_free * tau - d), d / tau - down
     s.g_rock = z * (v_whole - d / tau)
@@ -351,7 +357,7 @@ def meet_nothing(par, s, chain, waves, tau):
 
 
 @inlined
-def by_loss(par, s, chain, waves, i):
+def velocity_by_loss(par, s, chain, waves, i):
     """Mean velocity of a bar below the piston by the impulses of loss at its ends [m/s].
 
     Without it momentum that an end gives a bar would move its mean by about v eta/2 less than its
@@ -374,10 +380,16 @@ def move_bars(par, s, chain, waves, damper, tau, rest):
     for i in range(struck, par.bars):
         v0, w0 = bars[VELOCITY, i], bars[BY_LOSS, i]
         gained = (came[FROM_ABOVE, i] - came[FROM_BELOW, i]) * bodies[i, INV_MASS]
-        v1, w1 = v0 + came[ACCELERATION, i] * tau + gained, by_loss(par, s, chain, waves, i)
-        path = 0.5 * (tau * (v0 + v1) + rest * (v1 - v0))
+        v1, w1 = (
+            v0 + came[ACCELERATION, i] * tau + gained,
+            velocity_by_loss(par, s, chain, waves, i),
+        )
+        more = 0.5 * tau * (w0 + w1)
+        path = 0.5 * (tau * (v0 + v1) + rest * (v1 - v0)) + more
         bars[VELOCITY, i], bars[BY_LOSS, i] = v1, w1
-        bars[POSITION, i] += path + 0.5 * tau * (w0 + w1)
+        bars[POSITION, i] += path
+        # what its waves get of body forces, beside their work, loss has taken from the waves
+        s.e_loss += bodies[i, MASS] * came[ACCELERATION, i] * more
         lifted += bodies[i, MASS] * path
         if i == struck:
             held = path
@@ -442,19 +454,19 @@ def meet(par, s, chain, waves, tau, blows, events):
     else:
         meet_rock(par, s, chain, waves, tau, time, events)
     s.i_contact += impulse
-    bars = waves.bars
-    lossy = -bars[BY_LOSS, par.struck]
     held = move_bars(par, s, chain, waves, damper, tau, rest)
+    bars = waves.bars
     if par.piston != Piston.ABSENT:
         half, u_before = 0.5 * tau, s.u_r
-        lossy = lossy - bars[BY_LOSS, par.struck] if par.damper == 0 else 0.0
+        a_p, more = piston_acceleration(par, push), 0.0
         if par.piston == Piston.ELASTIC:
             impulse = s.g_contact * tau
-            lossy += bars[BY_LOSS, 0]
-            bars[BY_LOSS, 0] = -s.viscous_contact / par.mass_p
-            lossy += bars[BY_LOSS, 0]
-        a_p = piston_acceleration(par, push)
-        s.u_r += half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p + lossy) - held
+            by_loss = -s.viscous_contact / par.mass_p
+            more = half * (bars[BY_LOSS, 0] + by_loss)
+            bars[BY_LOSS, 0] = by_loss
+            s.e_loss += par.mass_p * a_p * more
+            book_piston_load(par, s, push, more, 0.0)
+        s.u_r += half * (2.0 * (s.v_p + a_p * half) - impulse / par.mass_p) + more - held
         v_p, given = s.v_p, s.i_drive
         move_piston(par, s, push, impulse, u_before, time, tau, events)
         if par.damper == 1:  # recoil of a drive that has turned

@@ -36,6 +36,8 @@ THIRD = 2.25
 REACH, LEAST_REACH = 4.5, 4.0
 # In so many rounds the variance of what ends comes right to rounding.
 ROUNDS = 8
+# Waves on their way are spread over so many standard deviations.
+REACH_ON_THE_WAY = 3.0
 # Weights below this, at either end, are rounding.
 NOTHING = 1e-18
 
@@ -134,6 +136,39 @@ def _normal(variance, reach):
             moment, lost = add(moment, lost, weights[k] * (place * place))
         wide *= variance / (moment + lost)
     return weights
+
+
+@preparing
+def on_the_way(cells, spread):
+    """Weights by which a wave has been spread in each cell on its way, row by row.
+
+    Parameters
+    ----------
+    cells : int
+    spread : float
+        Variance that a step adds [steps^2].
+
+    Returns
+    -------
+    weights : ndarray
+        Of a cell from the newest wave to the oldest, 2 reach + 1 of them; then of the next.
+    reach : int
+        0: nothing is spread, and there are no weights.
+    """
+    if spread == 0.0:
+        return np.zeros(0), 0
+    reach = math.ceil(REACH_ON_THE_WAY * math.sqrt(cells * spread))
+    weights = np.zeros(cells * (2 * reach + 1))
+    for cell in range(cells):
+        variance, middle = (cell + 0.5) * spread, cell * (2 * reach + 1) + reach
+        if 0.5 * variance <= UTMOST_SPREAD:
+            weights[middle - 1] = weights[middle + 1] = 0.5 * variance
+            weights[middle] = 1.0 - variance
+        else:
+            row = _normal(variance, reach)
+            for j in range(2 * reach + 1):
+                weights[middle - reach + j] = row[j]
+    return weights, reach
 
 
 @preparing
