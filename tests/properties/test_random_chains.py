@@ -276,9 +276,11 @@ class Balance:
         solver, s = self.simulation.solver, self.simulation._state.record[0]
         total = solver._chain.bodies[:, Body.MASS] @ self.simulation._state.arrays[0][Bar.VELOCITY]
         # loss adds to the force of waves what they give later
-        total -= s["viscous_rock"]
+        par = solver._par[0]
+        late = par["viscous"] * par["dt"]
+        total -= late * s["g_rock"]
         if self.simulation.scene.piston.model == "rigid":
-            total += s["viscous_contact"] + s["v_p"] * self.simulation.scene.piston.mass
+            total += late * s["g_contact"] + s["v_p"] * self.simulation.scene.piston.mass
         if self.simulation.scene.effects.damper:
             total += s["v_c"] * self.simulation.scene.damper.casing_mass
         return float(total)

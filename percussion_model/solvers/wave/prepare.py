@@ -81,7 +81,6 @@ def begin(p, s, chain, waves, numbers):
         gap = numbers.joints[k, 3]
         waves.joints[Has.GAP, k] = gap
         waves.joints[Has.CLOSED, k] = 1.0 if gap == 0.0 else 0.0
-    s.end_start = s.x_r + s.p
     if p.piston != Piston.ABSENT:
         s.u_r = s.u_0 = -s.gap
     kinetic, elastic = stored(p, s, chain, waves)

@@ -74,8 +74,7 @@ class Has(IntEnum):
     CAME = 4  # energy that came down to it [J]
     PASSED = 5  # that went on downward
     RETURNED = 6  # that was sent back up
-    BY_WAVES = 7  # force by the waves alone in its last step [N]
-    VISCOUS = 8  # impulse of loss beside them since the start [N s]
+    BY_WAVES = 7  # force by the waves alone at the end of its last step [N]
 
 
 class Bar(IntEnum):
@@ -161,12 +160,9 @@ WAVE_STATE = np.dtype(
         ("u_c", "f8"),  # its displacement [m]
         ("x_c", "f8"),  # shortening of the damper since the start [m]
         ("e_stored", "f8"),  # in joints and damper [J]
-        ("end_start", "f8"),  # position of the bit's lower end at the start [m]
         ("u_0", "f8"),  # u_r at the start [m]
-        ("g_contact", "f8"),  # force by the waves alone below the piston in the last step [N]
+        ("g_contact", "f8"),  # force by the waves alone below the piston after the last step [N]
         ("g_rock", "f8"),  # and at the rock
-        ("viscous_contact", "f8"),  # impulses of loss beside them since the start [N s]
-        ("viscous_rock", "f8"),
         ("i_came", "f8"),  # energy that came down to the rock [J]
         ("i_returned", "f8"),  # that it sent back
         *COMMON_STATE,

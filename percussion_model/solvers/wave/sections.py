@@ -258,28 +258,6 @@ def kinetic_of_bar(chain, waves, step, bar):
 
 
 @kernel
-def shortening(dt, chain, waves, step, bar, from_top):
-    """Mean of a bar less one of its ends, by the strain in between [m].
-
-    Parameters
-    ----------
-    from_top : int
-        1 for (top end - mean), 0 for (mean - bottom end); positive where the bar is compressed.
-    """
-    mass, above, moment = chain.bodies[bar, MASS], 0.0, 0.0
-    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
-        cells, own = chain.places[k, CELLS], chain.steel[k, CELL_MASS]
-        transit = own / chain.steel[k, IMPEDANCE]
-        for cell in range(cells):
-            short = wave_in_cell(chain, waves.rings, step, k, 0, cell)
-            short -= wave_in_cell(chain, waves.rings, step, k, 1, cell)
-            middle = above + 0.5 * own
-            moment += short * transit * (mass - middle if from_top == 1 else middle)
-            above += own
-    return moment / mass
-
-
-@kernel
 def energy_of_bar(dt, chain, waves, step, bar):
     """All energy of a bar: of each wave what has not yet arrived of it [J]."""
     energy, given = 0.0, waves.bars[GIVEN, bar]
@@ -299,3 +277,23 @@ def energy_of_bar(dt, chain, waves, step, bar):
             one += x * x
         energy += chain.steel[k, IMPEDANCE] * dt * one
     return energy
+
+
+@kernel
+def velocity_of_bar(dt, chain, waves, step, bar):
+    """Mean velocity of a bar: by the momentum of each wave that has not yet arrived [m/s]."""
+    momentum, given = 0.0, waves.bars[GIVEN, bar]
+    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
+        size, taps, weight = chain.places[k, SIZE], chain.places[k, TAPS], chain.places[k, WEIGHTS]
+        one = 0.0
+        for way in range(2):
+            start, left = chain.places[k, RING] + 2 * size * way, 1.0
+            for age in range(chain.places[k, DELAY] + taps):
+                late = age - chain.places[k, DELAY]
+                if late > 0:
+                    left -= chain.weights[0, weight + taps - late]
+                one += left * (waves.rings[0, start + ((step - age) & (size - 1))] + given)
+            kept = kept_of(chain, k)
+            one += kept * (waves.rings[0, chain.places[k, RING] + 4 * size + way] + kept * given)
+        momentum += chain.steel[k, IMPEDANCE] * dt * one
+    return momentum * chain.bodies[bar, INV_MASS]

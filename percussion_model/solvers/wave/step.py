@@ -46,21 +46,21 @@ from percussion_model.solvers.wave.sections import (
     part_of_step,
     pass_on,
     send,
-    shortening,
+    velocity_of_bar,
     write_given,
 )
 
 PERFECT, _, LOSSY, THREADED = (float(kind) for kind in Joint)
 VELOCITY, POSITION, BY_LOSS = int(Bar.VELOCITY), int(Bar.POSITION), int(Bar.BY_LOSS)
 KIND, YIELD, PRELOAD, STIFFNESS, DAMPING, SECTION, STIFF, ABOVE, BELOW = (int(row) for row in Fit)
-CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES, VISCOUS = (int(row) for row in Has)
+CLOSED, GAP, FORCE, LEAST, CAME, PASSED, RETURNED, BY_WAVES = (int(row) for row in Has)
 # A part of a step shorter than this is not worth a step of its own.
 SHORTEST_PART = 1e-3
 # Ends that approach each other by no more do not touch: where bars part, it is rounding [m/s].
 REST_APPROACH = 1e-12
 # Where its kinetic energy is below this share of the barrier, a bit stands still without a doubt.
-FAR_BELOW = 0.5
-# Mean motion is derived anew from waves and gap so often [steps].
+FAR_BELOW = 0.8
+# Mean velocities are derived anew from the waves so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
 CHECKPOINT_STEPS = 64
@@ -139,6 +139,12 @@ def accelerations(par, s, chain, waves, push):
 
 
 @inlined
+def passed_to(old, new, tau, dt):
+    """What changes from `old` to `new` in a step, after a part of it, as waves that are mixed."""
+    return new if tau == dt else old + tau / dt * (new - old)
+
+
+@inlined
 def kick_of(par, waves, bar):
     """Mean velocity that body forces give in a step [m/s]."""
     return 0.5 * par.dt * waves.came[ACCELERATION, bar]
@@ -204,8 +210,7 @@ def meet_joints(par, s, chain, waves, tau):
         else:
             force = give_way(s, fits, joints, j, a, y, tau) / tau
         by_waves = before + force / (1.0 + par.viscous)
-        joints[BY_WAVES, j] = by_waves
-        joints[VISCOUS, j] += (force - by_waves) * tau
+        joints[BY_WAVES, j] = passed_to(joints[BY_WAVES, j], by_waves, tau, par.dt)
         v_a, v_b = v_a - by_waves * fits[j, ABOVE], v_b + by_waves * fits[j, BELOW]
         s.e_loss += (force - by_waves) * (v_b - v_a) * tau
         returned, passed = v_a - down, v_b - up
@@ -302,8 +307,7 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
         d_t, q_t, impulse = mass_contact(v_p, v_v, par.mass_p, z_v, tau)
         s.e_numerical += z_v * (q_t - d_t * d_t / tau)
     by_waves = before + impulse / (more * tau)
-    s.g_contact = by_waves
-    s.viscous_contact += impulse - by_waves * tau
+    s.g_contact = passed_to(s.g_contact, by_waves, tau, par.dt)
     v_t += by_waves / z_t
     s.e_loss += (impulse - by_waves * tau) * v_t
     if elastic:
@@ -332,10 +336,10 @@ def meet_rock(par, s, chain, waves, tau, time, events):
             energy = kinetic_of_bar(chain, waves, s.step, bit)
     d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
     impulse, up = z_v * (v_free * tau - d), d / tau - down
-    s.g_rock = z * (v_whole - d / tau)
-    s.viscous_rock += impulse - s.g_rock * tau
-    s.e_loss += (s.g_rock - impulse / tau) * d
-    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, s.g_rock * tau
+    by_waves = z * (v_whole - d / tau)
+    s.g_rock = passed_to(s.g_rock, by_waves, tau, par.dt)
+    s.e_loss += (by_waves - impulse / tau) * d
+    waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, by_waves * tau
     s.e_numerical += z_v * (q - d * d / tau)
     s.rock_work += z_v * (v_free * d - q)
     s.i_bit += impulse
@@ -360,15 +364,15 @@ def meet_nothing(par, s, chain, waves, tau):
 def velocity_by_loss(par, s, chain, waves, i):
     """Mean velocity of a bar below the piston by the impulses of loss at its ends [m/s].
 
-    Without it momentum that an end gives a bar would move its mean by about v eta/2 less than its
-    ends.
+    They are eta/2 of the forces by waves. Without them momentum that an end gives a bar would
+    move its mean by v eta/2 less than its ends.
     """
-    joints, j, above, below = waves.joints, i - par.struck, s.viscous_contact, s.viscous_rock
+    joints, j, above, below = waves.joints, i - par.struck, s.g_contact, s.g_rock
     if j > 0:
-        above = joints[VISCOUS, j - 1]
+        above = joints[BY_WAVES, j - 1]
     if i < par.bars - 1:
-        below = joints[VISCOUS, j]
-    return (above - below) * chain.bodies[i, INV_MASS]
+        below = joints[BY_WAVES, j]
+    return par.viscous * par.dt * (above - below) * chain.bodies[i, INV_MASS]
 
 
 @inlined
@@ -435,7 +439,7 @@ def meet(par, s, chain, waves, tau, blows, events):
     push = drive_force(par, s)
     damper = accelerations(par, s, chain, waves, push)
     lost, mixed = pass_on(par, s, chain, waves)
-    rest, share, g_contact, g_rock = 0.0, 1.0, s.g_contact, s.g_rock
+    rest = 0.0
     if s.live == 1:
         if par.piston != Piston.ABSENT:
             tau = time_to_cut(par, s, chain, waves, push, tau)
@@ -460,8 +464,8 @@ def meet(par, s, chain, waves, tau, blows, events):
         half, u_before = 0.5 * tau, s.u_r
         a_p, more = piston_acceleration(par, push), 0.0
         if par.piston == Piston.ELASTIC:
-            impulse = s.g_contact * tau
-            by_loss = -s.viscous_contact / par.mass_p
+            impulse = waves.came[FROM_ABOVE, par.struck]
+            by_loss = -par.viscous * par.dt * s.g_contact / par.mass_p
             more = half * (bars[BY_LOSS, 0] + by_loss)
             bars[BY_LOSS, 0] = by_loss
             s.e_loss += par.mass_p * a_p * more
@@ -480,29 +484,18 @@ def meet(par, s, chain, waves, tau, blows, events):
             if rest > 0.0:
                 further = 0.5 * rest * (a_p * tau - impulse / par.mass_p)
                 book_piston_load(par, s, push, further, 0.0)
-    if rest > 0.0:  # as the waves that are mixed
-        s.g_contact = g_contact + share * (s.g_contact - g_contact)
-        s.g_rock = g_rock + share * (s.g_rock - g_rock)
     pass_time(par, s, tau)
     return due, tau
 
 
 @kernel
 def resync(par, s, chain, waves):
-    """Derive the mean of the bit from its lower end, and u_r from the gap.
-
-    So rounding in the running sums can never drift away from them.
-    """
-    bit = par.bars - 1
-    waves.bars[POSITION, bit] = s.x_r + s.p - s.end_start
-    waves.bars[POSITION, bit] += shortening(par.dt, chain, waves, s.step, bit, 0)
-    if par.piston == Piston.ABSENT:
-        return
-    s.u_r = shortening(par.dt, chain, waves, s.step, par.struck, 1) - s.gap
+    """Derive the mean velocities from the waves, so that rounding cannot part them."""
+    for i in range(par.bars):
+        waves.bars[VELOCITY, i] = velocity_of_bar(par.dt, chain, waves, s.step, i)
+    s.v_b = waves.bars[VELOCITY, par.bars - 1]
     if par.piston == Piston.ELASTIC:
-        s.u_r += shortening(par.dt, chain, waves, s.step, 0, 0)
-    if par.damper == 1:
-        s.u_r -= s.x_c
+        s.v_p = waves.bars[VELOCITY, 0]
 
 
 @kernel
@@ -542,7 +535,7 @@ def step(par, s, chain, waves, tau, blows, events):
         for i in range(par.bars):
             if abs(bars[GIVEN, i]) > par.most_given:
                 write_given(chain, waves, i)
-    if share < 1.0 or s.step % RESYNC_STEPS == 0:
+    if s.step % RESYNC_STEPS == 0:
         resync(par, s, chain, waves)
     if s.mode == Mode.SS and (s.n_check == 0 or s.step % CHECKPOINT_STEPS == 0):
         push_checkpoint(s, time_of(par, s))
