@@ -268,7 +268,7 @@ def test_a_bouncing_bit_is_that_of_a_general_integrator(removed):
     assert simulate(until).end["hole_depth"] == pytest.approx(wanted[2], rel=1e-6)
 
 
-@pytest.mark.parametrize("cells", [20, 40])
+@pytest.mark.parametrize("cells", [24, 40])
 def test_waves_drill_with_cuttings_as_elements_do(cells):
     """By lumped masses with a law of their own, 50 and 100 in the piston: 14.853, 14.855 mm/s."""
     changes = {"effects.cuttings": True, "rock.removed_share": 0.5, "solver.cells": cells}

@@ -1,13 +1,14 @@
 """Weights by which a wave arrives at the far end of a section.
 
-A wave takes the time T = (n + f) dt from end to end, and structural loss spreads it as a normal
-distribution of the variance eta T does, with the third moment 9/4 eta^2 T: exp(-s T /
-sqrt(1 + eta s)) of docs/model.md, eq. 2, to the third order in s.
+A wave takes the time T = (n + f) dt from end to end, and structural loss spreads it as exp(-s T /
+sqrt(1 + eta s)) does (docs/model.md, eq. 2): its cumulants are T, eta T, 9/4 eta^2 T, 15/2 eta^3 T.
 So it arrives as a sum of what was sent at some steps before, by weights whose sum is one: a
-lasting force passes as it is. The part f dt of a step is Lagrange's cubic between four steps, in
-its middle interval, where it lets no frequency grow (T. Laakso et al., IEEE Signal Processing
-Magazine 13 (1996) 30); the spread is by samples of the normal distribution, or where it is narrow
-by weights (a, 1 - 2 a, a), some times, which let none grow either. So no weights make energy.
+lasting force passes as it is. They are samples of a gamma distribution with the first three
+cumulants, whose fourth is 243/32 eta^3 T. None is below zero: nothing turns before a front.
+Where the spread is narrow, the part f dt of a step is Lagrange's cubic between four steps, in its
+middle interval, where it lets no frequency grow (T. Laakso et al., IEEE Signal Processing
+Magazine 13 (1996) 30), and the spread is by weights (a, 1 - 2 a, a), some times, which let none
+grow either. So no weights make energy.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import math
 
 import numpy as np
 
-from percussion_model.physics.elementary import exp
+from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import preparing
 from percussion_model.scene.bars import add
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
@@ -27,8 +28,11 @@ WHOLE = 1e-9
 MOST_SPREAD = 0.25
 # And where steps are few, up to this.
 UTMOST_SPREAD = 0.5
-# Above this variance samples of a normal distribution have it to rounding [steps^2].
-LEAST_NORMAL = 2.0
+# Above this variance samples of a distribution do: 4e-5 is the part of what changes from step to
+# step that they take for slower [steps^2].
+LEAST_SAMPLED = 0.5
+# Below this skewness a gamma distribution is a normal one to rounding.
+LEAST_SKEWNESS = 1e-3
 # Third moment eta^2 T of loss: so many times the square of its variance by T.
 THIRD = 2.25
 # They end so many standard deviations from the mean, where they are 4e-5 of the greatest; where a
@@ -67,12 +71,10 @@ def weights_of(transit, variance):
     else:
         delay, weights = whole - 1, _cubic(part)
     rest, room = max(variance, 0.0), delay - 1
-    reach = min(room, math.ceil(REACH * math.sqrt(rest)))
-    if rest >= LEAST_NORMAL and reach >= LEAST_REACH * math.sqrt(rest):
-        weights = _scaled(_convolved(weights, _normal(rest, reach)))
-        if room - reach < 2:
-            return delay - reach, weights, rest
-        return delay - reach - 2, _convolved(weights, _skew(transit, rest)), rest
+    reach = min(whole - 1, math.ceil(REACH * math.sqrt(rest)))
+    if rest >= LEAST_SAMPLED and reach >= LEAST_REACH * math.sqrt(rest):
+        third = THIRD * rest * rest / transit
+        return whole - reach, samples(part, rest, third, reach), rest
     rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
         return delay, weights, 0.0
@@ -80,8 +82,6 @@ def weights_of(transit, variance):
     once = np.array([a, 1.0 - 2.0 * a, a])
     for _ in range(rounds):
         weights = _convolved(weights, once)
-    if room - rounds >= 2:
-        weights, delay = _convolved(weights, _skew(transit, variance)), delay - 2
     first, end = 0, len(weights)
     while abs(weights[first]) <= NOTHING:
         first += 1
@@ -91,13 +91,6 @@ def weights_of(transit, variance):
     for k in range(end - first):
         left[k] = weights[first + k]
     return delay - rounds + first, _scaled(left), 2.0 * a * rounds
-
-
-@preparing
-def _skew(transit, variance):
-    """Weights that give a distribution its third moment, and leave all before as they are."""
-    c = THIRD * variance * variance / transit / 6.0
-    return np.array([-0.5 * c, c, 1.0, -c, 0.5 * c])
 
 
 @preparing
@@ -122,19 +115,42 @@ def _scaled(weights):
 
 
 @preparing
-def _normal(variance, reach):
-    """Samples of a normal distribution so wide that they have the variance though they end."""
-    weights, wide = np.zeros(2 * reach + 1), variance
+def samples(middle, variance, third, reach):
+    """Samples of a gamma distribution so wide that they have its moments though they end.
+
+    Parameters
+    ----------
+    middle : float
+        Mean, from the sample `reach` on, from 0 to 1 [steps].
+    variance, third : float
+        Second and third cumulant [steps^2, steps^3].
+
+    Returns
+    -------
+    ndarray, shape (2 reach + 2,)
+    """
+    weights, wide, place = np.zeros(2 * reach + 2), math.sqrt(variance), middle
     for _ in range(ROUNDS):
-        for k in range(2 * reach + 1):
-            place = float(k - reach)
-            weights[k] = exp(-0.5 * (place * place) / wide)
+        skewness = third / (wide * wide * wide)
+        for k in range(2 * reach + 2):
+            z = (k - reach - place) / wide
+            weights[k] = 0.0
+            if skewness < LEAST_SKEWNESS:
+                weights[k] = exp(-0.5 * z * z)
+            elif 1.0 + 0.5 * skewness * z > 0.0:
+                inner = log(1.0 + 0.5 * skewness * z)
+                weights[k] = exp((4.0 / (skewness * skewness) - 1.0) * inner - 2.0 * z / skewness)
         _scaled(weights)
+        mean = lost = 0.0
+        for k in range(2 * reach + 2):
+            mean, lost = add(mean, lost, weights[k] * (k - reach))
+        mean += lost
         moment = lost = 0.0
-        for k in range(2 * reach + 1):
-            place = float(k - reach)
-            moment, lost = add(moment, lost, weights[k] * (place * place))
-        wide *= variance / (moment + lost)
+        for k in range(2 * reach + 2):
+            off = k - reach - mean
+            moment, lost = add(moment, lost, weights[k] * (off * off))
+        place += middle - mean
+        wide *= math.sqrt(variance / (moment + lost))
     return weights
 
 
@@ -165,7 +181,7 @@ def on_the_way(cells, spread):
             weights[middle - 1] = weights[middle + 1] = 0.5 * variance
             weights[middle] = 1.0 - variance
         else:
-            row = _normal(variance, reach)
+            row = samples(0.0, variance, 0.0, reach)
             for j in range(2 * reach + 1):
                 weights[middle - reach + j] = row[j]
     return weights, reach
