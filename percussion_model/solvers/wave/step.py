@@ -384,10 +384,8 @@ def move_bars(par, s, chain, waves, damper, tau, rest):
     for i in range(struck, par.bars):
         v0, w0 = bars[VELOCITY, i], bars[BY_LOSS, i]
         gained = (came[FROM_ABOVE, i] - came[FROM_BELOW, i]) * bodies[i, INV_MASS]
-        v1, w1 = (
-            v0 + came[ACCELERATION, i] * tau + gained,
-            velocity_by_loss(par, s, chain, waves, i),
-        )
+        v1 = v0 + came[ACCELERATION, i] * tau + gained
+        w1 = velocity_by_loss(par, s, chain, waves, i)
         more = 0.5 * tau * (w0 + w1)
         path = 0.5 * (tau * (v0 + v1) + rest * (v1 - v0)) + more
         bars[VELOCITY, i], bars[BY_LOSS, i] = v1, w1
