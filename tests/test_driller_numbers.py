@@ -183,11 +183,11 @@ def test_greatest_stresses_have_their_place():
 
 def test_an_fmu_does_not_depend_on_the_hole():
     pytest.importorskip("pythonfmu")
-    from fmu_src.hammer.build import _scene
+    from fmu_src.hammer.build import given_values
     from fmu_src.hammer.variables import hammer_variables
 
     scene = Scene(hole_diameter=HOLE)
     variables = hammer_variables(scene)
     assert variables == hammer_variables(Scene())
     assert not [one.name for one in variables if "hole_diameter" in one.name]
-    assert _scene(scene, variables, "")["given"] == Scene().given_values()
+    assert given_values(scene) == Scene().given_values()

@@ -24,6 +24,7 @@ from percussion_model.solvers.modal.resolution import CALIBRATED, modes_by_rule,
 from percussion_model.solvers.wave.resolution import (
     COARSER,
     DEFAULT_STEPS,
+    STEPS_OF_TWO,
     coarser_steps,
     error_by_steps,
     steps_for,
@@ -47,10 +48,12 @@ def test_rule_passes_through_its_calibration_and_rises():
 def test_steps_are_as_many_as_they_promise():
     """Errors by steps are of first order: the steps for an accuracy are just enough for it."""
     for accuracy in (1e-4, 7e-4, 1e-3, 4e-3):
-        steps = steps_for(accuracy)
-        assert error_by_steps(steps) <= accuracy * (1.0 + 1e-12)
-        assert error_by_steps(steps - 1) > accuracy
-    assert steps_for(0.1) == DEFAULT_STEPS
+        for is_string in (True, False):
+            steps = steps_for(accuracy, is_string)
+            assert error_by_steps(steps, is_string) <= accuracy * (1.0 + 1e-12)
+            assert error_by_steps(steps - 1, is_string) > accuracy
+    assert steps_for(0.1, True) == DEFAULT_STEPS
+    assert steps_for(0.1, False) == STEPS_OF_TWO
     for steps in (2, 16, 80, 160):
         assert coarser_steps(steps) == pytest.approx(steps / COARSER, abs=0.5)
     assert coarser_steps(1) == 1
@@ -229,7 +232,7 @@ def on_grid(rate, cells=80, scatter=0.0, cycles=5.0):
     """A run with a given rate and so many steps."""
     result = invented(rate, scatter, cells=cells)
     result.blows["drilling_cycles"] = cycles
-    return GridRun(result, error_by_steps(cells))
+    return GridRun(result, error_by_steps(cells, False))
 
 
 def test_the_error_is_that_of_the_first_order():

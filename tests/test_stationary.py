@@ -114,7 +114,7 @@ def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
     assert off <= coarse.multiplier_error < 0.1 * coarse.multiplier
     show_settled(coarse)
     (line,) = [one for one in capsys.readouterr().out.splitlines() if "Deviation" in one]
-    assert f"{coarse.multiplier:.4f} ± {coarse.multiplier_error:.4f}" in line
+    assert f"{coarse.multiplier:.3f} ± {coarse.multiplier_error:.3f}" in line
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
     assert rigid.others == ()
     assert 0.0 < rigid.multiplier_error < 0.01 * rigid.multiplier
@@ -122,7 +122,7 @@ def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
 
 def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
     """On one of the grids that these cells are compared with, blows alternate."""
-    found = settled(chatter(20), error_estimate=True)
+    found = settled(chatter(26), error_estimate=True)
     assert (found.order, found.others[0].order) == (1, 2)
     assert found.same_motion is False
     assert math.isnan(found.multiplier_error)
@@ -233,8 +233,8 @@ def test_command_tells_the_cycle(tmp_path):
 
 def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
     """Blows of this motion agree by chance within the tolerance before it goes on."""
-    changes = WAVES | {"feed.force": 1715.0, "rock.loading_stiffness": 1.7884e9}
-    scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.013032})
+    changes = WAVES | {"feed.force": 500 + 9500 / 6, "rock.loading_stiffness": 2e9}
+    scene = Scene().replace(**changes, **{"drive.reversal_distance": 0.01 + 0.07 * 4 / 19})
     found = settled(scene, most_blows=200)
     alike = np.all(
         [
@@ -247,10 +247,10 @@ def test_chance_repetitions_of_an_aperiodic_motion_are_no_cycle():
     assert found.kind == "aperiodic"
 
 
-# Wandering motions in which that happens nine times each; where, depends on rounding.
+# Wandering motions in which that happens; where, depends on rounding.
 @pytest.mark.parametrize(
     ("feed", "distance"),
-    [(500 + 9500 * 11 / 24, 0.01 + 0.07 * 4 / 19), (500 + 9500 * 22 / 24, 0.01)],
+    [(500 + 9500 * 11 / 24, 0.01), (2875.0, 0.01 + 0.07 / 19)],
 )
 def test_a_few_blows_that_converge_by_chance_are_no_cycle(feed, distance):
     """After tens of blows a few fall evenly to less than the tolerance, and rise again."""

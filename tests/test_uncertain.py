@@ -117,7 +117,7 @@ def test_zeros_that_are_known_are_shown():
 
 
 def test_large_shares_have_no_exponent():
-    (said,) = _large_error(Estimate(cells=7.5, fit=0.0, scatter=0.0, floor=0.0), "wave")
+    (said,) = _large_error(Estimate(grid=7.5, scatter=0.0, floor=0.0), "wave")
     assert f"{LARGE} 750 %, as coarser runs tell" in said
     (said,) = numerical_note(1.0, "wave")
     assert said.startswith("100 % of the energy put in is taken")

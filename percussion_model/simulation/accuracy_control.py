@@ -185,7 +185,7 @@ def _first_grids(scene: Scene) -> list[int]:
     if scene.solver_name == "modal":
         modes = modes_for(numbers_of(scene), wanted)
         return [*coarser_modes(modes, REQUESTED), modes]
-    steps = steps_for(wanted)
+    steps = steps_for(wanted, scene.effects.string)
     return [coarser_steps(steps), steps]
 
 

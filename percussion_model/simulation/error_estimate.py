@@ -191,7 +191,7 @@ class Estimate:
 def grid_run(result: Result) -> GridRun:
     """A result with what its steps or modes promise."""
     if result.solver == "wave":
-        return GridRun(result, error_by_steps(_resolution(result)))
+        return GridRun(result, error_by_steps(_resolution(result), result.scene.effects.string))
     if result.solver != "modal":
         return GridRun(result)
     numbers, modes = numbers_of(result.scene), _resolution(result)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from percussion_model import Scene, Simulation
+from percussion_model.solvers.wave.records import Place, Steel
 
 E, RHO, AREA = 210e9, 7850.0, 2e-3
 C0 = math.sqrt(E / RHO)
@@ -52,9 +53,14 @@ def after(simulation, steps):
 
 def sent_down(simulation, name, steps):
     """Mean force that was sent into a bar in each step so far, where none comes up in it."""
-    force = after(simulation, steps)[f"{name}_force"]
-    assert len(force) >= steps
-    return force[:steps][::-1]
+    after(simulation, steps)
+    solver, state = simulation.solver, simulation._state
+    section = solver._sections[name].start
+    ring, size = solver._chain.places[section, [Place.RING, Place.SIZE]]
+    assert size >= steps
+    ages = (int(state.record[0]["step"]) - np.arange(steps)) & (size - 1)
+    sent = solver._chain.steel[section, Steel.IMPEDANCE] * state.arrays[-1][0, ring + ages]
+    return sent[::-1]
 
 
 def of_joint(simulation, row, joint=0):

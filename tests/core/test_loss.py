@@ -79,13 +79,9 @@ def decay_of_modes(sections, cells, most, eta=ETA):
 
 
 def error_of_decay(sections, cells, eta):
-    """Of the decay rate by mode, less what its fourth moment makes, per (omega dt)^2.
-
-    A mode decays with eta omega^2/2. A wave crosses by exp(-s T / sqrt(1 + eta s)), whose fourth
-    cumulant is 7.5 eta^3 T; weights have none, which adds 5/8 (eta omega)^2.
-    """
+    """Of the decay rate by mode, which is eta omega^2/2, per (omega dt)^2."""
     omega, decay, dt = decay_of_modes(sections, cells, 3, eta)
-    error = decay / (0.5 * eta * omega**2) - 1.0 - 0.625 * (eta * omega) ** 2
+    error = decay / (0.5 * eta * omega**2) - 1.0
     return error / (omega * dt) ** 2
 
 

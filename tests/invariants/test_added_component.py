@@ -225,7 +225,7 @@ def test_a_drag_on_the_bit(run, solver):
     alone = found["alone"]
     assert alone["bit_velocity"] == pytest.approx(velocity, rel=0.01)
     assert alone["drag"] == pytest.approx(taken, rel=0.01)
-    assert alone["dissipated"] >= alone["drag"]
+    assert alone["dissipated"] >= (1.0 - 1e-12) * alone["drag"]  # but for rounding
     assert all(entries["drag"] > 0.0 for entries in found.values())
 
 

@@ -67,7 +67,7 @@ def test_no_whole_number_is_without_limits(runs, name):
 
 
 # Steps of the waves, which have their own test.
-STEPS = ("step",)
+STEPS = ("step", "leap_end")
 # Ticks, sets and counts of modes of the modal solver, of which tests/test_modal.py has a test.
 OF_MODES = (
     *("time", "look", "piston_time", "no_park", "closed_at", "rest_until"),

@@ -36,7 +36,7 @@ def bit_alone(scene: Scene) -> Scene:
     if scene.solver_name == "modal":
         return scene.replace(**{"solver.cells": modes_for(numbers_of(scene), wanted)})
     if scene.solver_name == "wave":
-        return scene.replace(**{"solver.cells": steps_for(wanted)})
+        return scene.replace(**{"solver.cells": steps_for(wanted, scene.effects.string)})
     return scene
 
 

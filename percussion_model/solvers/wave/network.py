@@ -166,7 +166,7 @@ def _time_step(numbers, sections, counts):
     if not math.isnan(values.solver_cells):
         return first / values.solver_cells
     if not math.isnan(values.solver_accuracy):
-        return first / steps_for(values.solver_accuracy)
+        return first / steps_for(values.solver_accuracy, len(numbers.rod_counts) > 0)
     steps = DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS
     longest = first / (steps if len(numbers.rod_counts) > 0 else STEPS_OF_TWO)
     end = counts[0]

@@ -13,7 +13,7 @@ import math
 DEFAULT_STEPS, DEFAULT_ERROR = 16, 5e-3
 # And where there are no rods, whose steps are cut at closures: the reference is then off by 1e-4,
 # ready-made hammers by up to 1 %.
-STEPS_OF_TWO = 24
+STEPS_OF_TWO, ERROR_OF_TWO = 24, 1e-2
 # Steps of a wave from outside, and the relative error of what it does, times them: its front and
 # end are spread over one or two. Without loss up to 0.3 was seen of peaks, 0.6 of work on rock.
 PULSE_STEPS, ERROR_OF_A_STEP = 192, 0.7
@@ -21,14 +21,18 @@ PULSE_STEPS, ERROR_OF_A_STEP = 192, 0.7
 COARSER = 1.5
 
 
-def steps_for(accuracy: float) -> int:
-    """Steps for a wanted relative error of the rate of penetration."""
-    return max(DEFAULT_STEPS, math.ceil(DEFAULT_STEPS * DEFAULT_ERROR / accuracy))
+def steps_for(accuracy: float, is_string: bool) -> int:
+    """Steps for a wanted relative error of the rate of penetration, of rods or of two bars."""
+    if is_string:
+        return max(DEFAULT_STEPS, math.ceil(DEFAULT_STEPS * DEFAULT_ERROR / accuracy))
+    return max(STEPS_OF_TWO, math.ceil(STEPS_OF_TWO * ERROR_OF_TWO / accuracy))
 
 
-def error_by_steps(steps: int) -> float:
+def error_by_steps(steps: int, is_string: bool) -> float:
     """Relative error of the rate of penetration that so many steps promise."""
-    return DEFAULT_ERROR * DEFAULT_STEPS / steps
+    if is_string:
+        return DEFAULT_ERROR * DEFAULT_STEPS / steps
+    return ERROR_OF_TWO * STEPS_OF_TWO / steps
 
 
 def error_by_pulse(steps: float) -> float:

@@ -185,9 +185,12 @@ def wave_in_cell(chain, rings, step, k, way, cell):
     age = cell if way == 0 else places[k, CELLS] - 1 - cell
     start, wave = places[k, RING] + 2 * size * way, 0.0
     weight = places[k, PASSAGE] + age * (2 * reach + 1) + reach
+    newest = rings[0, start + (step & (size - 1))]
     for j in range(-reach, reach + 1):
-        then = min(max(age + j, 0), size - 1)  # what is still to come is as the newest
-        wave += chain.passage[0, weight + j] * rings[0, start + ((step - then) & (size - 1))]
+        then = min(abs(age + j), size - 1)
+        sent = rings[0, start + ((step - then) & (size - 1))]
+        # what is still to come goes on in a straight line
+        wave += chain.passage[0, weight + j] * (sent if age + j >= 0 else 2.0 * newest - sent)
     return wave
 
 

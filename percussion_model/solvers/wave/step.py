@@ -59,7 +59,7 @@ SHORTEST_PART = 1e-3
 # Ends that approach each other by no more do not touch: where bars part, it is rounding [m/s].
 REST_APPROACH = 1e-12
 # Where its kinetic energy is below this share of the barrier, a bit stands still without a doubt.
-FAR_BELOW = 0.8
+FAR_BELOW = 0.1
 # Mean velocities are derived anew from the waves so often [steps].
 RESYNC_STEPS = 256
 # Spacing of the bit force's checkpoints while standing still [steps].
@@ -267,7 +267,7 @@ def time_to_cut(par, s, chain, waves, push, tau):
     """
     v_p, v_t, yields = free_ends(par, s, chain, waves, push)
     approach = v_p - v_t - yields * par.lag * s.g_contact
-    if par.joints > 0 or s.closed == 1 or approach <= 0.0 or s.cuts >= MOST_CUTS:
+    if par.joints > 0 or s.closed == 1 or approach <= REST_APPROACH or s.cuts >= MOST_CUTS:
         return tau
     reach = s.gap / approach
     if reach < SHORTEST_PART * par.dt or reach > (1.0 - SHORTEST_PART) * par.dt:

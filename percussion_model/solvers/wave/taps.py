@@ -82,6 +82,8 @@ def weights_of(transit, variance):
     once = np.array([a, 1.0 - 2.0 * a, a])
     for _ in range(rounds):
         weights = _convolved(weights, once)
+    if room - rounds >= 2:
+        weights, delay = _convolved(weights, _skew(transit, variance)), delay - 2
     first, end = 0, len(weights)
     while abs(weights[first]) <= NOTHING:
         first += 1
@@ -91,6 +93,13 @@ def weights_of(transit, variance):
     for k in range(end - first):
         left[k] = weights[first + k]
     return delay - rounds + first, _scaled(left), 2.0 * a * rounds
+
+
+@preparing
+def _skew(transit, variance):
+    """Weights that give a distribution its third moment, and leave all before as they are."""
+    c = THIRD * variance * variance / transit / 6.0
+    return np.array([-0.5 * c, c, 1.0, -c, 0.5 * c])
 
 
 @preparing
@@ -129,9 +138,9 @@ def samples(middle, variance, third, reach):
     -------
     ndarray, shape (2 reach + 2,)
     """
-    weights, wide, place = np.zeros(2 * reach + 2), math.sqrt(variance), middle
+    weights, wide, place, skewed = np.zeros(2 * reach + 2), math.sqrt(variance), middle, third
     for _ in range(ROUNDS):
-        skewness = third / (wide * wide * wide)
+        skewness = skewed / (wide * wide * wide)
         for k in range(2 * reach + 2):
             z = (k - reach - place) / wide
             weights[k] = 0.0
@@ -145,12 +154,14 @@ def samples(middle, variance, third, reach):
         for k in range(2 * reach + 2):
             mean, lost = add(mean, lost, weights[k] * (k - reach))
         mean += lost
-        moment = lost = 0.0
+        moment = cube = lost = rest = 0.0
         for k in range(2 * reach + 2):
             off = k - reach - mean
             moment, lost = add(moment, lost, weights[k] * (off * off))
+            cube, rest = add(cube, rest, weights[k] * (off * off * off))
         place += middle - mean
         wide *= math.sqrt(variance / (moment + lost))
+        skewed += third - (cube + rest)
     return weights
 
 
@@ -180,10 +191,13 @@ def on_the_way(cells, spread):
         if 0.5 * variance <= UTMOST_SPREAD:
             weights[middle - 1] = weights[middle + 1] = 0.5 * variance
             weights[middle] = 1.0 - variance
-        else:
-            row = samples(0.0, variance, 0.0, reach)
-            for j in range(2 * reach + 1):
-                weights[middle - reach + j] = row[j]
+        else:  # of a normal distribution, which is near enough to read them
+            whole = 0.0
+            for j in range(-reach, reach + 1):
+                weights[middle + j] = exp(-0.5 * j * j / variance)
+                whole += weights[middle + j]
+            for j in range(-reach, reach + 1):
+                weights[middle + j] /= whole
     return weights, reach
 
 
