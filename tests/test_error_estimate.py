@@ -105,7 +105,7 @@ def test_runs_to_compare_with_are_short(monkeypatch):
     result = simulate(Scene().computed_by("wave"), record_events=False)
     (cells, end), *others = seen
     assert (cells, end) == (24, 4.0)
-    assert [count for count, _ in others] == [16]
+    assert [count for count, _ in others if count != cells] == [16]
     assert all(part < 0.15 * end for _, part in others)
     blows = result.blows[result.blows["time"] + result.blows["period"] <= others[0][1]]
     assert len(blows) >= FEWEST_BLOWS
@@ -135,7 +135,7 @@ def test_without_a_rate_there_is_no_error():
 
 
 def test_what_cannot_be_made_coarser_states_no_error():
-    one_cell = {"solver.name": "wave", "bit.sections.0.length": 0.175, "solver.cells": 1}
+    one_cell = {"solver.name": "wave", "bit.sections.0.length": 0.25, "solver.cells": 1}
     one_element = {"run.duration": 0.5, "run.settle": 0.2, "fem.elements": 1}
     for scene in (Scene().replace(**one_cell), Scene().computed_by("fem", **one_element)):
         result = simulate(scene, record_events=False)

@@ -107,31 +107,31 @@ def chatter(cells):
 
 
 def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
-    coarse = settled(Scene().replace(**WAVES), error_estimate=True)
-    fine = settled(Scene().replace(**WAVES, **{"solver.cells": 100}))
+    scenes = [Scene().replace(**WAVES, **{"solver.cells": n}) for n in (28, 100)]
+    coarse, fine = settled(scenes[0], error_estimate=True), settled(scenes[1])
     assert coarse.same_motion is True
     off = abs(coarse.multiplier - fine.multiplier)
     assert off <= coarse.multiplier_error < 0.1 * coarse.multiplier
     show_settled(coarse)
     (line,) = [one for one in capsys.readouterr().out.splitlines() if "Deviation" in one]
-    assert f"{coarse.multiplier:.3f} ± {coarse.multiplier_error:.3f}" in line
+    assert f"{coarse.multiplier:.4f} ± {coarse.multiplier_error:.4f}" in line
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
     assert rigid.others == ()
     assert 0.0 < rigid.multiplier_error < 0.01 * rigid.multiplier
 
 
 def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
-    """On one of the grids that these cells are compared with, blows alternate."""
-    found = settled(chatter(26), error_estimate=True)
-    assert (found.order, found.others[0].order) == (1, 2)
+    """By the longer steps that these are compared with, no blow is as another."""
+    found = settled(chatter(44), error_estimate=True)
+    assert (found.order, found.others[0].order) == (1, 0)
     assert found.same_motion is False
     assert math.isnan(found.multiplier_error)
     assert found.summary()["multiplier_error"] is None
     show_settled(found)
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "not the same on a second resolution: periodic, 2 blows a cycle" in shown
+    assert "not the same on a second resolution: aperiodic" in shown
     assert "Deviation after a cycle undecided, at this resolution" in shown
-    show_settled(settled(chatter(20)))
+    show_settled(settled(chatter(24)))
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "on no second resolution tried" in shown
 

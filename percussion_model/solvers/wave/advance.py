@@ -21,7 +21,7 @@ from percussion_model.solvers.wave.sections import (
 )
 from percussion_model.solvers.wave.step import BY_LOSS, POSITION, step, time_of
 
-ADVANCE, READ = (int(task) for task in Task)
+ADVANCE, _, SAMPLE = (int(task) for task in Task)
 # Events that one step can make besides the rock's crossings: contact and drive.
 OTHER_EVENTS = 4
 # A time this close below a grid point is that grid point, and the shortest that is read [steps].
@@ -56,10 +56,11 @@ def show_motion(par, s, waves, row, time):
 
 
 @merged
-def read_at(par, s, chain, waves, time, blows, events, row):
-    """Read the ledger at the grid point, then let the ends meet up to `time` and read the rest."""
-    kinetic, elastic = stored(par, s, chain, waves)
-    fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
+def read_at(par, s, chain, waves, time, blows, events, row, with_ledger):
+    """Read the ledger at the grid point, let the ends meet up to `time`, and read the rest."""
+    if with_ledger:
+        kinetic, elastic = stored(par, s, chain, waves)
+        fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
     row.bit_kinetic_energy = kinetic_of_bar(chain, waves, s.step, par.bars - 1)
     tau = max(time - time_of(par, s), SHORTEST * par.dt)
     bit, contact = s.i_bit, s.i_contact
@@ -97,6 +98,7 @@ def run(task, par_, state, chain_, waves_, time, blows, events, reading):
     task : int
         ADVANCE: commit the whole steps up to `time`.
         READ: evaluate at `time`; spoils the state but for its rings, so give a copy.
+        SAMPLE: as READ, without the ledger.
     par_, state : WAVE_PAR, WAVE_STATE array of length 1
     chain_ : Chain
     waves_ : Waves
@@ -113,9 +115,9 @@ def run(task, par_, state, chain_, waves_, time, blows, events, reading):
     """
     par, s = par_[0], state[0]
     chain, waves = refer(chain_), refer(waves_)
-    if task == Task.READ:
+    if task != Task.ADVANCE:
         s.live = 0
-        read_at(par, s, chain, waves, time, blows, events, reading[0])
+        read_at(par, s, chain, waves, time, blows, events, reading[0], task == Task.READ)
         return Status.DONE
     s.n_blows = 0
     s.n_events = 0
@@ -157,7 +159,7 @@ def sample(par_, state, chain, waves, memory, spare, spare_waves, spare_memory, 
         Times that were read: fewer than all where blows or events were listed, or a blow may start.
     """
     # as numbers of a type that `run` has been compiled for, not as constants of their own
-    advance, read = np.int64(ADVANCE), np.int64(READ)
+    advance, read = np.int64(ADVANCE), np.int64(SAMPLE)
     for k in range(len(times)):
         status = run(advance, par_, state, chain, waves, times[k], blows, events, reading)
         if status != Status.DONE:

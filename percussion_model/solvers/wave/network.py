@@ -269,7 +269,9 @@ def network_of(numbers, plan):
             weights = _appended(weights, used, cut.row)
             used += len(cut.row)
             spread, all_wanted = spread + cut.spread, all_wanted + wanted
-            row, reach = on_the_way(places[k, Place.CELLS], cut.spread / transit)
+            row, reach = on_the_way(
+                places[k, Place.CELLS], cut.spread / transit, places[k, Place.SIZE]
+            )
             places[k, Place.PASSAGE], places[k, Place.REACH] = passed, reach
             passage = _appended(passage, passed, row)
             passed += len(row)

@@ -100,6 +100,7 @@ class Task(IntEnum):
 
     ADVANCE = 0
     READ = 1
+    SAMPLE = 2
 
 
 class Chain(NamedTuple):

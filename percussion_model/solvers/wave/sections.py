@@ -7,6 +7,7 @@ import numpy as np
 from percussion_model.physics.kernel import inlined, kernel, preparing
 from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, totals
 from percussion_model.solvers.wave.records import Bar, Body, Place, Steel
+from percussion_model.solvers.wave.taps import width_of
 
 BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS, PASSAGE, REACH = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, CELL_MASS, BY_LOSS, BY_MIXING = (int(row) for row in Steel)
@@ -183,14 +184,21 @@ def wave_in_cell(chain, rings, step, k, way, cell):
     if reach == 0:
         return sent_to_cell(places, rings, step, k, way, cell)
     age = cell if way == 0 else places[k, CELLS] - 1 - cell
-    start, wave = places[k, RING] + 2 * size * way, 0.0
-    weight = places[k, PASSAGE] + age * (2 * reach + 1) + reach
-    newest = rings[0, start + (step & (size - 1))]
+    start, row = places[k, RING] + 2 * size * way, width_of(reach)
+    weight = places[k, PASSAGE] + age * row
+    if age >= reach:
+        first = start + ((step - age - reach) & (size - 1))
+        sums = load(chain.passage, 0, weight) * load(rings, 0, first)
+        for j in range(WIDTH, row, WIDTH):
+            sums = sums + load(chain.passage, 0, weight + j) * load(rings, 0, first + j)
+        return total(sums)
+    newest, wave = rings[0, start + (step & (size - 1))], 0.0
     for j in range(-reach, reach + 1):
-        then = min(abs(age + j), size - 1)
+        then = abs(age + j)
         sent = rings[0, start + ((step - then) & (size - 1))]
         # what is still to come goes on in a straight line
-        wave += chain.passage[0, weight + j] * (sent if age + j >= 0 else 2.0 * newest - sent)
+        sent = sent if age + j >= 0 else 2.0 * newest - sent
+        wave += chain.passage[0, weight + reach + j] * sent
     return wave
 
 

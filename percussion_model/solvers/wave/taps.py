@@ -18,9 +18,10 @@ import math
 import numpy as np
 
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import preparing
+from percussion_model.physics.kernel import inlined, preparing
 from percussion_model.scene.bars import add
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
+from percussion_model.solvers.modal.lanes import WIDTH
 
 # A part of a step below this is rounding [steps].
 WHOLE = 1e-9
@@ -165,8 +166,14 @@ def samples(middle, variance, third, reach):
     return weights
 
 
+@inlined
+def width_of(reach):
+    """Weights of a cell: of its reach, in whole lanes."""
+    return (2 * reach + WIDTH) // WIDTH * WIDTH
+
+
 @preparing
-def on_the_way(cells, spread):
+def on_the_way(cells, spread, size):
     """Weights by which a wave has been spread in each cell on its way, row by row.
 
     Parameters
@@ -174,20 +181,23 @@ def on_the_way(cells, spread):
     cells : int
     spread : float
         Variance that a step adds [steps^2].
+    size : int
+        Of the ring that they are to be applied to.
 
     Returns
     -------
     weights : ndarray
-        Of a cell from the newest wave to the oldest, 2 reach + 1 of them; then of the next.
+        Of a cell 2 reach + 1 of them, alike on both sides, in whole lanes; then of the next.
     reach : int
         0: nothing is spread, and there are no weights.
     """
-    if spread == 0.0:
-        return np.zeros(0), 0
     reach = math.ceil(REACH_ON_THE_WAY * math.sqrt(cells * spread))
-    weights = np.zeros(cells * (2 * reach + 1))
+    reach = min(reach, (size - WIDTH) // 2)
+    if spread == 0.0 or reach < 1:
+        return np.zeros(0), 0
+    weights = np.zeros(cells * width_of(reach))
     for cell in range(cells):
-        variance, middle = (cell + 0.5) * spread, cell * (2 * reach + 1) + reach
+        variance, middle = (cell + 0.5) * spread, cell * width_of(reach) + reach
         if 0.5 * variance <= UTMOST_SPREAD:
             weights[middle - 1] = weights[middle + 1] = 0.5 * variance
             weights[middle] = 1.0 - variance
