@@ -157,7 +157,8 @@ def rebound(blow: Blow, how: Reading) -> tuple[slice, float]:
     flights = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
     if not flights:
         return slice(0, 0), math.nan
-    longest = slice(*max(flights, key=lambda one: one[1] - one[0]))
+    first, end = max(flights, key=lambda one: one[1] - one[0])
+    longest = slice(first, end - 1)  # in the last one the flight may have ended
     return longest, -_slope(blow.time, path, longest)
 
 

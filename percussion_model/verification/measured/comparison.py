@@ -36,6 +36,8 @@ SHARPER = 1e-3
 # The same blow with a step this much longer tells the numerical error: of first order in the
 # step, the error is no more than what that changes.
 COARSER = 2.0
+# Rounds of a search at most: numbers by waves have small jumps, by which it stops early.
+MOST_ROUNDS = 12
 # Where searches start, as shares of the range of a parameter; and when the numbers are met, in
 # their sharpened errors.
 STARTS = (0.1, 0.4, 0.7)
@@ -339,7 +341,7 @@ def _best_place(like: Likelihood, plan: FitPlan, scene: Scene, box: np.ndarray) 
     """
     best: Place | None = None
     for start in _starts(like, plan, scene, box):
-        found, _ = descend(like, start, range(len(plan.parameters)))
+        found, _ = descend(like, start, range(len(plan.parameters)), rounds=MOST_ROUNDS)
         if best is None or found.deviance < best.deviance:
             best = found
         pairs = zip(best.residuals, like.series, strict=True)
