@@ -156,10 +156,11 @@ def test_the_tightest_request_is_met(seed):
 
 def test_plan_lists_what_will_be_run():
     scene = Scene().replace(**{"solver.accuracy": 1e-3, "solver.name": "wave"})
-    assert planned_cells(scene) == [53, 80]
-    assert planned_cells(scene.replace(**{"run.check": True})) == [53, 80, 160]
+    assert planned_cells(scene) == [160, 240]
+    checked = scene.replace(**{"solver.accuracy": 4e-3, "run.check": True})
+    assert planned_cells(checked) == [40, 60, 120]
     odd = scene.replace(**{"bit.sections.0.length": 0.175 * 1.432})
-    assert planned_cells(odd) == [53, 80]
+    assert planned_cells(odd) == [160, 240]
     assert planned_cells(odd.replace(**{"solver.name": None})) == [20, 28, 40, 56]
 
 
