@@ -45,6 +45,7 @@ def fmus(tmp_path_factory):
     for name, text in (("chambers", CHAMBERS), ("rotation", ROTATION)):
         (folder / "percussion_model" / "components" / f"{name}.py").write_text(text)
     (folder / "with.toml").write_text(SCENE)
+    shutil.copy(ROOT / "LICENSE", folder)
     kept = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
     kept["PYTHONPATH"] = str(folder)
     for words in (["native", "with.toml", "-o", "."], ["fmu", "with.toml", "-o", "slave.fmu"]):
