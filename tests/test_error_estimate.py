@@ -106,8 +106,9 @@ def test_runs_to_compare_with_are_short(monkeypatch):
     (cells, end), *others = seen
     assert (cells, end) == (24, 4.0)
     assert [count for count, _ in others if count != cells] == [16]
-    # an eighth of the work: of one run with two thirds of the steps, a fifth of the time
-    assert all(part < 0.22 * end for _, part in others)
+    # work rises between steps and their square
+    work = sum(part * 0.5 * (n / cells + (n / cells) ** 2) for n, part in others if n != cells)
+    assert work < 0.13 * end
     blows = result.blows[result.blows["time"] + result.blows["period"] <= others[0][1]]
     assert len(blows) >= FEWEST_BLOWS
 

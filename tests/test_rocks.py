@@ -90,8 +90,7 @@ def test_fitted_numbers_are_those_of_the_validation(name):
     )
     stiffness, ratio = map(float, found.groups())
     assert rock(name).number(STIFFNESS).value == pytest.approx(1e6 * stiffness, rel=1e-3)
-    # its last digit is a quarter of the error that stands beside it
-    assert rock(name).number(RATIO).value == pytest.approx(ratio, rel=1e-3, abs=0.011)
+    assert rock(name).number(RATIO).value == pytest.approx(ratio, rel=1e-3)
 
 
 def test_derived_numbers_follow_from_strengths():

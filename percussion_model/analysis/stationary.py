@@ -14,7 +14,7 @@ import numpy as np
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.driller_numbers import driller_numbers
-from percussion_model.simulation.error_estimate import with_error_estimate
+from percussion_model.simulation.error_estimate import FIRST_ORDER, with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
@@ -23,8 +23,6 @@ from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 from percussion_model.simulation.warnings import warnings_of_motion
 
-# What a coarser run tells of a multiplier's error is an estimate itself.
-SAFETY = 2.0
 # A run in which no blow ends for so long [s], and `STALLED_PERIODS` of the last, has stalled.
 STALLED_AFTER = 2.0
 # The standard error is first believed after so many blows, and checked again
@@ -199,7 +197,7 @@ class Settled:
             return math.nan
         before = _multiplier(self.blows[:earlier], self.order)
         off = [abs(other.multiplier - self.multiplier) for other in self.others]
-        return abs(self.multiplier - before) + SAFETY * float(np.max(off, initial=0.0))
+        return abs(self.multiplier - before) + FIRST_ORDER * float(np.max(off, initial=0.0))
 
     @property
     def counted(self) -> np.ndarray:

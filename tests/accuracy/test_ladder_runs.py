@@ -186,7 +186,11 @@ def test_a_rigid_hammer_has_an_error_and_no_order(found):
 
 def test_advice_names_a_method_that_keeps_the_word(found):
     text = replace(found, points=[p for p in found.points if p.ladder != "modal"]).advice(1e-3)
-    assert text.startswith("For 0.1 % take ")
+    (named,) = (
+        p for p in found.points if f"take {LADDERS[p.ladder].title}, {p.label}, the" in text
+    )
+    finer = [p for p in found.ladder(named.ladder) if p.size <= named.size]
+    assert all(p.errors[RATE] <= 1e-3 for p in finer)
     assert "no method" in replace(found, points=found.ladder("rigid")).advice(1e-9)
 
 

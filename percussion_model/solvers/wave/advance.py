@@ -16,8 +16,8 @@ from percussion_model.solvers.wave.records import Task
 from percussion_model.solvers.wave.sections import (
     DOWN,
     UP_OUT,
-    energy_of_bar,
     kinetic_of_bar,
+    under_way,
 )
 from percussion_model.solvers.wave.step import BY_LOSS, POSITION, step, time_of
 
@@ -34,7 +34,7 @@ def stored(par, s, chain, waves):
     kinetic = whole = 0.0
     for i in range(par.bars):
         kinetic += kinetic_of_bar(chain, waves, s.step, i)
-        whole += energy_of_bar(par.dt, chain, waves, s.step, i)
+        whole += under_way(par.dt, chain, waves, s.step, i)[0]
     elastic = whole - kinetic + s.e_stored
     if par.piston == Piston.RIGID:
         kinetic += 0.5 * par.mass_p * s.v_p * s.v_p

@@ -269,12 +269,14 @@ def kinetic_of_bar(chain, waves, step, bar):
 
 
 @kernel
-def energy_of_bar(dt, chain, waves, step, bar):
-    """All energy of a bar: of each wave what has not yet arrived of it [J]."""
-    energy, given = 0.0, waves.bars[GIVEN, bar]
+def under_way(dt, chain, waves, step, bar):
+    """Energy [J] and mean velocity [m/s] of a bar: of each wave what has not yet arrived of it."""
+    energy = momentum = 0.0
+    given = waves.bars[GIVEN, bar]
     for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
         size, taps, weight = chain.places[k, SIZE], chain.places[k, TAPS], chain.places[k, WEIGHTS]
-        one = 0.0
+        one = both = 0.0
+        kept = kept_of(chain, k)
         for way in range(2):
             start = chain.places[k, RING] + 2 * size * way
             left = 1.0
@@ -284,27 +286,10 @@ def energy_of_bar(dt, chain, waves, step, bar):
                     left -= chain.weights[0, weight + taps - late]
                 x = waves.rings[0, start + ((step - age) & (size - 1))] + given
                 one += left * x * x
-            x = waves.rings[0, chain.places[k, RING] + 4 * size + way] + kept_of(chain, k) * given
+                both += left * x
+            x = waves.rings[0, chain.places[k, RING] + 4 * size + way] + kept * given
             one += x * x
+            both += kept * x
         energy += chain.steel[k, IMPEDANCE] * dt * one
-    return energy
-
-
-@kernel
-def velocity_of_bar(dt, chain, waves, step, bar):
-    """Mean velocity of a bar: by the momentum of each wave that has not yet arrived [m/s]."""
-    momentum, given = 0.0, waves.bars[GIVEN, bar]
-    for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
-        size, taps, weight = chain.places[k, SIZE], chain.places[k, TAPS], chain.places[k, WEIGHTS]
-        one = 0.0
-        for way in range(2):
-            start, left = chain.places[k, RING] + 2 * size * way, 1.0
-            for age in range(chain.places[k, DELAY] + taps):
-                late = age - chain.places[k, DELAY]
-                if late > 0:
-                    left -= chain.weights[0, weight + taps - late]
-                one += left * (waves.rings[0, start + ((step - age) & (size - 1))] + given)
-            kept = kept_of(chain, k)
-            one += kept * (waves.rings[0, chain.places[k, RING] + 4 * size + way] + kept * given)
-        momentum += chain.steel[k, IMPEDANCE] * dt * one
-    return momentum * chain.bodies[bar, INV_MASS]
+        momentum += chain.steel[k, IMPEDANCE] * dt * both
+    return energy, momentum * chain.bodies[bar, INV_MASS]

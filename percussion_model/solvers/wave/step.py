@@ -46,7 +46,7 @@ from percussion_model.solvers.wave.sections import (
     part_of_step,
     pass_on,
     send,
-    velocity_of_bar,
+    under_way,
     write_given,
 )
 
@@ -490,7 +490,7 @@ def meet(par, s, chain, waves, tau, blows, events):
 def resync(par, s, chain, waves):
     """Derive the mean velocities from the waves, so that rounding cannot part them."""
     for i in range(par.bars):
-        waves.bars[VELOCITY, i] = velocity_of_bar(par.dt, chain, waves, s.step, i)
+        _, waves.bars[VELOCITY, i] = under_way(par.dt, chain, waves, s.step, i)
     s.v_b = waves.bars[VELOCITY, par.bars - 1]
     if par.piston == Piston.ELASTIC:
         s.v_p = waves.bars[VELOCITY, 0]
