@@ -5,6 +5,7 @@ Writes docs/images/undamped.png and the table of docs/data/undamped.md. Takes so
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -60,7 +61,10 @@ def rates() -> Iterator[dict[str, Any]]:
 def spread(rows: list[dict[str, Any]]) -> tuple[float, float]:
     """Greatest difference of the resolutions by the finest, and its standard error."""
     finest = rows[-1]
-    far = max(rows[:-1], key=lambda row: abs(row["rate"] - finest["rate"]))
+    others = [row for row in rows[:-1] if not math.isnan(row["rate"])]
+    if math.isnan(finest["rate"]) or not others:
+        return math.nan, math.nan
+    far = max(others, key=lambda row: abs(row["rate"] - finest["rate"]))
     error = (far["error"] ** 2 + finest["error"] ** 2) ** 0.5
     return abs(far["rate"] - finest["rate"]) / finest["rate"], error / finest["rate"]
 
@@ -116,13 +120,16 @@ def block(rows: list[dict[str, Any]]) -> str:
     for loss, mine in by_loss(rows).items():
         off, error = spread(mine)
         cells = [f"{loss:.4g}", *(_rate(row) for row in mine)]
-        cells += [f"{100 * off:.1f} ± {100 * error:.1f} %", f"{mine[-1]['cycles']:.0f}"]
+        apart = "–" if math.isnan(off) else f"{100 * off:.1f} ± {100 * error:.1f} %"
+        cells += [apart, f"{mine[-1]['cycles']:.0f}"]
         cells.append("yes" if all(row["warned"] for row in mine) else "no")
         lines.append(cells)
     return table(head, lines)
 
 
 def _rate(row: dict[str, Any]) -> str:
+    if math.isnan(row["rate"]):
+        return "not settled"
     rate, error = 1e3 * row["rate"], 1e3 * row["error"]
     return f"{rate:.2f} ± {error:.2f}" if error > 5e-3 else f"{rate:.3f}"
 
@@ -131,8 +138,9 @@ def main() -> None:
     """Make the figure and the table."""
     rows = []
     for row in rates():
-        rows.append(row)
         print({name: row[name] for name in ("loss", "cells", "rate", "error")}, file=sys.stderr)
+        # what has not settled within the duration has no rate
+        rows.append({name: math.nan if value is None else value for name, value in row.items()})
     style.save_figures(lambda: [("undamped", draw(rows))], HERE / "images", ("png",), dpi=110)
     page = HERE / "data" / "undamped.md"
     write_text(page, renewed(page, {"rates": block(rows)}))
