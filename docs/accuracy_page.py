@@ -204,7 +204,8 @@ def lost(names: Sequence[str], found: dict[float, list[Contest]]) -> str:
         if one.outcome != UNDECIDED and one.ratio < 1.0
     ]
     if not told:
-        return "In none of these scenes a peer is faster."
+        faster = "At these errors no peer is faster than it."
+        return f"{faster} The last row is of waves, the second method."
     return f"A peer is faster in {'; '.join(told)}."
 
 
