@@ -42,7 +42,6 @@ def baked_scene(
 
     if named is not None and option is not None:
         raise common.refusal(f"--scene {option}: a scene is given already, {named}")
-    common.load_numba()
     file = scene_file(named or option or REFERENCE)
     return file, Scene.from_toml(file).replace(**common.rock_changes(rock))
 

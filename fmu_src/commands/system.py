@@ -41,7 +41,6 @@ def system(
         if not systems:
             options.list_choices({plan.name: plan.description for plan in plans()})
             return 0
-        common.load_numba()
         problems = 0
         checked = set()
         chosen = plans() if systems == [ALL] else [find_plan(path) for path in systems]

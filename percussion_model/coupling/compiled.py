@@ -14,13 +14,10 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from percussion_model.coupling.component import LARGEST, WARNING, Component, Group
 from percussion_model.coupling.port import Port
-from percussion_model.physics.kernel import entry_of, nogil
+from percussion_model.physics.kernel import entry_of, nogil, when_compiling
 
 STEP, SET_REAL, SET_INTEGER, GET_REAL, GET_INTEGER, GET_BOOLEAN = range(6)
 SETTERS = {"Real": SET_REAL, "Integer": SET_INTEGER, "Boolean": SET_INTEGER}
@@ -42,43 +39,26 @@ CALL = np.dtype(
     ]
 )
 
-_BYTE, _WORD, _INT, _DOUBLE = (
-    ir.IntType(8).as_pointer(), ir.IntType(64), ir.IntType(32), ir.DoubleType(),
-)  # fmt: skip
 
-
-def _called(*parameters: Any) -> Any:
-    """Code that calls a function at an address, its first argument, with the others."""
-    shape = ir.FunctionType(_INT, parameters)
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        function = builder.inttoptr(arguments[0], shape.as_pointer())
-        given = [
-            builder.inttoptr(one, _BYTE) if kind is _BYTE else one
-            for one, kind in zip(arguments[1:], parameters, strict=True)
-        ]
-        return builder.call(function, given)
-
-    return code
-
-
-@intrinsic
-def exchange(
-    typing: Any, function: Any, component: Any, references: Any, count: Any, values: Any
-) -> tuple[Any, Any]:
+def exchange(function: int, component: int, references: int, count: int, values: int) -> int:
     """Call a getter or a setter of an FMU; all arguments are addresses but for the count."""
-    word = types.int64
-    return types.int32(word, word, word, word, word), _called(_BYTE, _BYTE, _WORD, _BYTE)
+    raise NotImplementedError("only compiled code makes such calls")
 
 
-@intrinsic
-def do_step(
-    typing: Any, function: Any, component: Any, time: Any, step: Any, forward: Any
-) -> tuple[Any, Any]:
+def do_step(function: int, component: int, time: float, step: float, forward: Any) -> int:
     """Call `fmi2DoStep`."""
-    word, real = types.int64, types.float64
-    shape = types.int32(word, word, real, real, types.int32)
-    return shape, _called(_BYTE, _DOUBLE, _DOUBLE, _INT)
+    raise NotImplementedError("only compiled code makes such calls")
+
+
+def _teach() -> None:
+    from percussion_model.coupling import instructions
+    from percussion_model.physics.compiling import instruct
+
+    instruct(exchange, instructions.exchange)
+    instruct(do_step, instructions.do_step)
+
+
+when_compiling(_teach)
 
 
 class At(IntEnum):

@@ -13,7 +13,7 @@ rounding error is kept (Dekker, Numer. Math. 18, 1971), so that little but the l
 rounds. Angles are taken into the first octant as Cody and Waite do, large ones as Payne and Hanek
 do. Tables are made by arithmetic of whole numbers when the module is imported. Errors stay below
 0.61 units in the last place. Special values are those of C99, and what is not a number is always
-the same.
+the same. `float` and `int` around numbers of tables make Python's own of them in plain Python.
 """
 
 from __future__ import annotations
@@ -22,11 +22,8 @@ import math
 import struct
 
 import numpy as np
-from llvmlite import ir
-from numba import config, types
-from numba.extending import intrinsic
 
-from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.kernel import inlined_scalar, scalar, when_compiling
 
 # Binary places of whole numbers that stand for numbers in the making.
 PLACES = 192
@@ -162,46 +159,53 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1.0) ** (n // 2) / math.factorial(n) for n i
 THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 
 
-@intrinsic
-def _bits_of(typing, x):
-    def generate(context, builder, signature, args):
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), generate
-
-
-@intrinsic
-def _number_of(typing, bits):
-    def generate(context, builder, signature, args):
-        return builder.bitcast(args[0], ir.DoubleType())
-
-    return types.float64(types.int64), generate
-
-
-def _plain_bits(x):
+def bits_of(x):
+    """The 64 bits of a number as a whole one with a sign."""
     return struct.unpack("<q", struct.pack("<d", x))[0]
 
 
-def _plain_number(bits):
+def number_of(bits):
+    """The number of 64 bits."""
     return struct.unpack("<d", struct.pack("<q", bits))[0]
 
 
-# The 64 bits of a number as a whole one with a sign, and back.
-bits_of = _plain_bits if config.DISABLE_JIT else _bits_of
-number_of = _plain_number if config.DISABLE_JIT else _number_of
+def _teach():
+    """Let kernels take bits and numbers as one another."""
+    from llvmlite import ir
+    from numba import types
+
+    from percussion_model.physics.compiling import instruct
+
+    def of_number(typing, x):
+        def generate(context, builder, signature, args):
+            return builder.bitcast(args[0], ir.IntType(64))
+
+        return types.int64(types.float64), generate
+
+    def of_bits(typing, bits):
+        def generate(context, builder, signature, args):
+            return builder.bitcast(args[0], ir.DoubleType())
+
+        return types.float64(types.int64), generate
+
+    instruct(bits_of, of_number)
+    instruct(number_of, of_bits)
+
+
+when_compiling(_teach)
 
 
 # --- sums and products of two numbers, with what rounding leaves out -----------------------------
 
 
-@inlined
+@inlined_scalar
 def _add(a, b):
     """Sum of two numbers and its error, the first the larger one or zero."""
     total = a + b
     return total, (a - total) + b
 
 
-@inlined
+@inlined_scalar
 def _add_any(a, b):
     """Sum of two numbers and its error."""
     total = a + b
@@ -209,7 +213,7 @@ def _add_any(a, b):
     return total, (a - (total - part)) + (b - part)
 
 
-@inlined
+@inlined_scalar
 def _multiply(a, b):
     """Product of two numbers and its error."""
     product = a * b
@@ -219,7 +223,7 @@ def _multiply(a, b):
     return product, error
 
 
-@inlined
+@inlined_scalar
 def power_of_two(n):
     """2**n for a whole number, as long as that is normal."""
     return number_of((n + 1023) << 52)
@@ -228,7 +232,7 @@ def power_of_two(n):
 # --- exponential ---------------------------------------------------------------------------------
 
 
-@inlined
+@inlined_scalar
 def _nearest_power(x):
     """Number k of the power 2**(k / PIECES) next to exp(x), and what is left of x, in two."""
     shifted = x * STEPS + ROUND
@@ -236,7 +240,7 @@ def _nearest_power(x):
     return bits_of(shifted) - ROUND_BITS, x - k * STEP_HIGH, -k * STEP_LOW
 
 
-@kernel
+@scalar
 def _exp_far(x):
     """`exp` where powers of two or the result are not normal numbers."""
     if x != x:
@@ -248,9 +252,9 @@ def _exp_far(x):
     k, high, low = _nearest_power(x)
     r = high + low
     square = r * r
-    change = POWER_REST[k & (PIECES - 1)] + r
+    change = float(POWER_REST[k & (PIECES - 1)]) + r
     change += square * (0.5 + r * SIXTH) + square * square * (1.0 / 24.0 + r * (1.0 / 120.0))
-    bits = POWER_BITS[k & (PIECES - 1)] + (k << SHIFT)
+    bits = int(POWER_BITS[k & (PIECES - 1)]) + (k << SHIFT)
     if k > 0:
         power = number_of(bits - (1 << 52))
         return 2.0 * (power + power * change)
@@ -264,7 +268,7 @@ def _exp_far(x):
     return y * 2.0**-1022
 
 
-@inlined
+@inlined_scalar
 def exp(x):
     """Exponential function."""
     if not abs(x) < NORMAL:
@@ -272,13 +276,13 @@ def exp(x):
     k, high, low = _nearest_power(x)
     r = high + low
     square = r * r
-    change = POWER_REST[k & (PIECES - 1)] + r
+    change = float(POWER_REST[k & (PIECES - 1)]) + r
     change += square * (0.5 + r * SIXTH) + square * square * (1.0 / 24.0 + r * (1.0 / 120.0))
-    power = number_of(POWER_BITS[k & (PIECES - 1)] + (k << SHIFT))
+    power = number_of(int(POWER_BITS[k & (PIECES - 1)]) + (k << SHIFT))
     return power + power * change
 
 
-@kernel
+@scalar
 def _expm1_far(x):
     """`expm1` of tiny and of large numbers."""
     if abs(x) <= TINY:
@@ -288,7 +292,7 @@ def _expm1_far(x):
     return exp(x)
 
 
-@inlined
+@inlined_scalar
 def expm1(x):
     """exp(x) - 1, precise where x is small."""
     if not TINY < abs(x) < NO_ONE:
@@ -296,13 +300,13 @@ def expm1(x):
     k, high, low = _nearest_power(x)
     r = high + low
     square = r * r
-    power = number_of(POWER_BITS[k & (PIECES - 1)] + (k << SHIFT))
+    power = number_of(int(POWER_BITS[k & (PIECES - 1)]) + (k << SHIFT))
     # power (1 + r + bend) - 1, of which power - 1 and r are the largest parts
     bend = square * (0.5 + r * SIXTH)
     bend += square * square * (1.0 / 24.0 + r * (1.0 / 120.0) + square * (1.0 / 720.0))
     less, left = _add_any(power, -1.0)
     total, error = _add(less, high)
-    rest = POWER_REST[k & (PIECES - 1)]
+    rest = float(POWER_REST[k & (PIECES - 1)])
     change = power * (bend + (low + (rest + rest * r))) + less * high
     return total + (error + (left + change))
 
@@ -310,7 +314,7 @@ def expm1(x):
 # --- logarithm -----------------------------------------------------------------------------------
 
 
-@inlined
+@inlined_scalar
 def _log(bits, change):
     """Logarithm of the normal number of these bits and of 1 + change, a rounding error."""
     offset = bits - LOG_START
@@ -318,19 +322,19 @@ def _log(bits, change):
     k = offset >> 52
     near = bits - (k << 52)
     head = number_of(near & LOG_MASK)
-    factor = LOG_FACTOR[j]
+    factor = float(LOG_FACTOR[j])
     # near * factor = 1 + r + low, without rounding
     r, low = _add(head * factor - 1.0, (number_of(near) - head) * factor)
     square = r * r
     bend = (r * 0.2 - 0.25) + square * ((r * (1.0 / 7.0) - SIXTH) - square * 0.125)
     bend = square * (r * THIRD - 0.5) + square * square * bend
     turns = float(k)
-    total, error = _add(turns * LN2_HIGH + LOG_HIGH[j], r)
-    low += (turns * LN2_LOW + LOG_LOW[j]) + change
+    total, error = _add(turns * LN2_HIGH + float(LOG_HIGH[j]), r)
+    low += (turns * LN2_LOW + float(LOG_LOW[j])) + change
     return total + ((error + low) + bend)
 
 
-@kernel
+@scalar
 def _log_far(x):
     """`log` of what is not a positive normal number."""
     if x == 0.0:
@@ -342,7 +346,7 @@ def _log_far(x):
     return _log(bits_of(x * 2.0**52) - (52 << 52), 0.0)
 
 
-@inlined
+@inlined_scalar
 def log(x):
     """Natural logarithm."""
     bits = bits_of(x)
@@ -351,7 +355,7 @@ def log(x):
     return _log(bits, 0.0)
 
 
-@kernel
+@scalar
 def atanh(x):
     """Inverse hyperbolic tangent, half of log((1 + x) / (1 - x))."""
     if abs(x) < SMALL:
@@ -370,13 +374,14 @@ def atanh(x):
 # --- sine and cosine -----------------------------------------------------------------------------
 
 
-@inlined
+@inlined_scalar
 def _pieces(at, m_0, m_1, m_2, m_3):
     """Sum of the products of pieces of a number and of 2/pi that have the same place."""
-    return m_0 * TURN[at] + m_1 * TURN[at + 1] + m_2 * TURN[at + 2] + m_3 * TURN[at + 3]
+    first, second, third, last = TURN[at], TURN[at + 1], TURN[at + 2], TURN[at + 3]
+    return m_0 * int(first) + m_1 * int(second) + m_2 * int(third) + m_3 * int(last)
 
 
-@kernel
+@scalar
 def _reduce_large(x):
     """Quarter turns in x modulo four, and the rest of it in two, by whole numbers."""
     bits = bits_of(abs(x))
@@ -422,7 +427,7 @@ def _reduce_large(x):
     return quarters & 3, high, low
 
 
-@inlined
+@inlined_scalar
 def _reduce(x):
     """Quarter turns in x modulo four, and the rest of it in two."""
     if abs(x) < OCTANT:
@@ -440,7 +445,7 @@ def _reduce(x):
     return bits_of(shifted) & 3, high, low
 
 
-@inlined
+@inlined_scalar
 def _sine(x, low):
     """Sine of x + low, in the first octant."""
     z = x * x
@@ -453,7 +458,7 @@ def _sine(x, low):
     return total + (error + ((low * (1.0 - 0.5 * z) + left * S3) + x * w * bend))
 
 
-@inlined
+@inlined_scalar
 def _cosine(x, low):
     """Cosine of x + low, in the first octant."""
     z = x * x
@@ -464,7 +469,7 @@ def _cosine(x, low):
     return total + (((error - 0.5 * (x - head) * (x + head)) + w * bend) - x * low)
 
 
-@kernel
+@scalar
 def sin(x):
     """Sine."""
     if abs(x) < SMALL:
@@ -476,7 +481,7 @@ def sin(x):
     return -y if quarters & 2 else y
 
 
-@kernel
+@scalar
 def cos(x):
     """Cosine."""
     if not abs(x) < math.inf:
@@ -486,7 +491,7 @@ def cos(x):
     return -y if (quarters + 1) & 2 else y
 
 
-@kernel
+@scalar
 def cos_and_sin(x):
     """`cos` and `sin`, both in little more time than one."""
     if not abs(x) < math.inf:
@@ -505,7 +510,7 @@ def cos_and_sin(x):
 # --- angles --------------------------------------------------------------------------------------
 
 
-@inlined
+@inlined_scalar
 def _first_octant(a, a_low, b, b_low):
     """Angle of tangent (a + a_low) / (b + b_low), at most an eighth of a turn, in two."""
     shifted = a / b * SLICES + ROUND
@@ -523,11 +528,11 @@ def _first_octant(a, a_low, b, b_low):
     low = (((up - product) - error) + (up_error - t * down_error)) * inverse
     z = t * t
     bend = t * z * (THIRD - z * (0.2 - z * (1.0 / 7.0)))
-    total, error = _add(ARC_HIGH[j], t)
-    return total, error + ((low + ARC_LOW[j]) - bend)
+    total, error = _add(float(ARC_HIGH[j]), t)
+    return total, error + ((low + float(ARC_LOW[j])) - bend)
 
 
-@inlined
+@inlined_scalar
 def _half_turn(a, a_low, b, b_low, left):
     """Angle from the axis to a point `a` beside it and `b` along it, or `b` behind where `left`."""
     steep = a > b
@@ -540,7 +545,7 @@ def _half_turn(a, a_low, b, b_low, left):
     return high + ((more + axis * HALF_PI_LOW) + sign * low)
 
 
-@kernel
+@scalar
 def atan2(y, x):
     """Angle of the point (x, y), from -pi to pi."""
     if x != x or y != y:
@@ -563,7 +568,7 @@ def atan2(y, x):
     return -angle if bits_of(y) < 0 else angle
 
 
-@inlined
+@inlined_scalar
 def _other_leg(x):
     """Root of 1 - x**2, in two."""
     square, error = _multiply(x, x)
@@ -574,7 +579,7 @@ def _other_leg(x):
     return _add(root, (((rest - product) - left) + (more - error)) * inverse)
 
 
-@kernel
+@scalar
 def acos(x):
     """Inverse cosine."""
     if not abs(x) < 1.0:

@@ -1,80 +1,161 @@
-"""Decorators of every kernel."""
+"""Decorators of every kernel.
+
+Numba takes a second to load. So a decorator only notes what is to be compiled; numba comes in
+(`compiling`) where a kernel is called from Python, or another one that calls it is compiled.
+"""
 
 from __future__ import annotations
 
 import functools
-import inspect
-import logging
+import os
+import sys
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from types import MethodType, ModuleType
 from typing import Any
 
-from numba import config, njit, types
-from numba.extending import register_jitable
 
-from percussion_model.physics import kept_kernels
-
-# Folders with functions that kernels of other files call.
-CALLEES = ("physics", "components", "scene", "solvers", "verification/accuracy")
-PACKAGE = Path(__file__).parents[1]
-# None: beside the sources, or where NUMBA_CACHE_DIR says.
-FOLDER = kept_kernels.prepare(PACKAGE, CALLEES)
-_log = logging.getLogger("percussion_model")
+def _is_set(name: str) -> bool:
+    """Whether a variable of the environment is a number other than zero, as numba reads it."""
+    with suppress(ValueError):
+        return int(os.environ.get(name, 0)) != 0
+    return False
 
 
-def compiled(**options: Any) -> Callable[[Callable], Any]:
-    """Decorator that compiles a kernel where it is first called, and keeps it in `FOLDER`.
+# Kernels run as plain Python.
+DISABLED = _is_set("NUMBA_DISABLE_JIT")
+# Numba without scipy's linear algebra (`own_process`).
+_is_light = False
+# What numba is to be taught before it compiles.
+_lessons: list[Callable[[], None]] = []
+# One thread at a time teaches it, and makes dispatchers.
+_making = threading.RLock()
 
-    Where numba finds no place for it, each process compiles it, which is told once.
+
+def _is_loaded(module: str) -> bool:
+    return sys.modules.get(module) is not None
+
+
+def own_process() -> None:
+    """Load numba, once it is needed, without scipy's linear algebra.
+
+    Numba looks for a BLAS in scipy, whose import takes longer than all of our kernels; none of
+    them calls it. A library must not do so to the process of its caller.
+    """
+    global _is_light
+    _is_light = True
+
+
+def _compiler() -> ModuleType:
+    """What loads numba, which is taught all there is."""
+    if _is_light and not (_is_loaded("numba") or _is_loaded("scipy.linalg")):
+        sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
+        try:
+            import numba.np.arraymath  # noqa: F401
+        finally:
+            del sys.modules["scipy.linalg"]
+    from percussion_model.physics import compiling
+
+    with _making:
+        while _lessons:
+            _lessons.pop(0)()
+    return compiling
+
+
+def when_compiling(teach: Callable[[], None]) -> None:
+    """Teach numba something once it is loaded: at once where it is."""
+    if DISABLED:
+        return
+    _lessons.append(teach)
+    if _is_loaded("numba"):
+        _compiler()
+
+
+class Kernel:
+    """A function that is compiled where it is first needed.
+
+    For numba it is the dispatcher that stands behind it.
+
+    Parameters
+    ----------
+    function : callable
+    is_scalar : bool
+        It takes and returns numbers alone, and runs as plain Python until numba is loaded.
+    is_kept : bool
+        Keep what is compiled for other processes.
+    options : dict
+        Of numba.
+    """
+
+    def __init__(
+        self, function: Callable, is_scalar: bool, is_kept: bool, options: dict[str, Any]
+    ) -> None:
+        functools.update_wrapper(self, function)
+        self.__code__ = function.__code__
+        self.__defaults__ = function.__defaults__
+        self.py_func = function
+        self._is_scalar, self._is_kept, self._options = is_scalar, is_kept, options
+        self._made: Any = None
+
+    @property
+    def dispatcher(self) -> Any:
+        """Numba's object for the function."""
+        if self._made is None:
+            with _making:
+                if self._made is None:  # another thread may have come before
+                    make = _compiler().dispatcher_of
+                    self._made = make(self.py_func, self._is_kept, self._options)
+        return self._made
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Call what is compiled, after compiling it where it is not."""
+        if self._is_scalar and not (_is_loaded("numba") or named):
+            # numpy's numbers would stay such, and warn where others become infinite
+            return self.py_func(*(one.item() if hasattr(one, "item") else one for one in arguments))
+        return self.dispatcher(*arguments, **named)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # copying and pickling ask for many: numba's are no help there
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(self.dispatcher, name)
+
+    def __get__(self, one: Any, kind: Any = None) -> Any:
+        return self if one is None else MethodType(self, one)
+
+    def __reduce__(self) -> Any:
+        """A kernel is found by its name, as a function is; one made within another, remade."""
+        if "<locals>" not in self.__qualname__:
+            return self.__qualname__
+        return Kernel, (self.py_func, self._is_scalar, self._is_kept, self._options)
+
+    def __repr__(self) -> str:
+        return f"<kernel {self.__module__}.{self.__qualname__}>"
+
+
+def compiled(*, is_scalar: bool = False, is_kept: bool = True, **options: Any) -> Callable:
+    """Decorator that compiles a kernel where it is first needed, and keeps it (`compiling`).
+
+    Parameters
+    ----------
+    is_scalar, is_kept : bool
+        See `Kernel`.
+    **options
+        Of numba.
     """
 
     def decorate(function: Callable) -> Any:
-        before = config.CACHE_DIR
-        config.CACHE_DIR = before if FOLDER is None else str(FOLDER)
-        try:
-            made = njit(cache=True, **options)(function)
-        except RuntimeError:
-            _tell_of_no_place()
-            return njit(**options)(function)
-        finally:
-            config.CACHE_DIR = before
-        if FOLDER is not None and hasattr(made, "stats"):
-            beside = Path(inspect.getfile(function)).with_name("__pycache__")
-            kept_kernels.take_along(Path(made.stats.cache_path), beside)
-        return _taking_numbers(made)
+        return function if DISABLED else Kernel(function, is_scalar, is_kept, options)
 
     return decorate
-
-
-def _taking_numbers(made: Any) -> Any:
-    """Let a kernel take the constants of those that call it as numbers like others.
-
-    Numba would compile it anew for each constant, which takes a sixth of all compiling.
-    """
-    find: Any = getattr(made, "get_call_template", None)  # none where nothing is compiled
-
-    def find_plain(arguments: Any, named: Any) -> Any:
-        named = {name: types.unliteral(kind) for name, kind in named.items()}
-        return find([types.unliteral(kind) for kind in arguments], named)
-
-    if find is not None:
-        made.get_call_template = find_plain
-    return made
-
-
-@functools.cache
-def _tell_of_no_place() -> None:
-    _log.warning(
-        "no folder can be written in which compiled kernels would be kept, so each start compiles "
-        "for about a minute: NUMBA_CACHE_DIR names one"
-    )
 
 
 def place_to_compile(function: Callable) -> Path | None:
     """Folder in which numba will keep a kernel once it is compiled; None where it does so already.
 
     A kernel counts as kept where numba's index of it is there. None as well where nothing is
-    compiled, or kept.
+    compiled, or kept. Loads numba, which knows the folder.
     """
     place = getattr(getattr(function, "stats", None), "cache_path", None)
     if place is None or getattr(function, "overloads", None):
@@ -95,6 +176,8 @@ def entry_of(function: Callable) -> Callable:
     short kernel where they are records. For callers whose arguments never change their
     types, not from object to object either: nothing looks at them any more.
     """
+    if isinstance(function, Kernel) and function._made is None:
+        return function  # without a call there is no entry, nor need for numba
     overloads = getattr(function, "overloads", {})
     if len(overloads) != 1:
         return function
@@ -116,7 +199,13 @@ def plain(function: Callable) -> Callable:
     For what is put together before a run. Compiled for Python, it would take longer to be
     compiled and loaded than it takes to run.
     """
-    register_jitable(function)
+
+    def teach() -> None:
+        from numba.extending import register_jitable
+
+        register_jitable(function)
+
+    when_compiling(teach)
     return function
 
 
@@ -135,6 +224,10 @@ nogil = compiled(error_model="numpy", _nrt=False, nogil=True)
 # For what runs in every step: arrays cost nine words an argument to pass.
 inlined = compiled(error_model="numpy", _nrt=False, forceinline=True)
 
+# For functions of numbers, which plain Python calls here and there, without numba.
+scalar = compiled(is_scalar=True, error_model="numpy", _nrt=False)
+inlined_scalar = compiled(is_scalar=True, error_model="numpy", _nrt=False, forceinline=True)
+
 # For long recursions, whose latency counts: a product and a sum may be one operation
 # with one rounding. The bits are the same in every run of one build.
 fused = compiled(error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
@@ -143,4 +236,4 @@ fused = compiled(error_model="numpy", _nrt=False, forceinline=True, fastmath={"c
 merged = compiled(error_model="numpy", _nrt=False, inline="always")
 
 # For kernels put together at import, which a cache could not tell apart: part of their callers.
-composed = njit(error_model="numpy", _nrt=False, forceinline=True)
+composed = compiled(is_kept=False, error_model="numpy", _nrt=False, forceinline=True)

@@ -2,73 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from numba import config, types
-from numba.core import cgutils
-from numba.core.datamodel import PrimitiveModel, register_default
-from numba.core.imputils import lower_getattr_generic
-from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import intrinsic
+from percussion_model.physics.kernel import when_compiling
 
 
-class Reference(types.Type):  # type: ignore[misc]
-    """Type of the address of a named tuple."""
-
-    def __init__(self, target: Any) -> None:
-        self.target = target
-        super().__init__(name=f"Reference({target})")
-
-    @property
-    def key(self) -> Any:
-        """What tells types apart."""
-        return self.target
-
-
-@register_default(Reference)
-class _ReferenceModel(PrimitiveModel):  # type: ignore[misc]
-    """Kept as a pointer."""
-
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, dmm.lookup(fe_type.target).get_value_type().as_pointer())
-
-
-def _field(reference, name):
-    """Place and type of a field; a tuple within is referred to as well."""
-    if name not in reference.target.fields:
-        return None
-    place = reference.target.fields.index(name)
-    kind = tuple(reference.target)[place]
-    return place, Reference(kind) if isinstance(kind, types.BaseNamedTuple) else kind
-
-
-@infer_getattr
-class _Fields(AttributeTemplate):  # type: ignore[misc]
-    key = Reference
-
-    def generic_resolve(self, reference, name):
-        found = _field(reference, name)
-        return None if found is None else found[1]
-
-
-@lower_getattr_generic(Reference)
-def _get(context, builder, reference, address, name):
-    place, kind = _field(reference, name)
-    inner = cgutils.gep_inbounds(builder, address, 0, place)
-    return inner if isinstance(kind, Reference) else builder.load(inner)
-
-
-@intrinsic
-def _refer(typing, value):
-    def generate(context, builder, signature, args):
-        return cgutils.alloca_once_value(builder, args[0])
-
-    return Reference(value)(value), generate
-
-
-def _same(value):
+def refer(value):
+    """The address of a named tuple, for as long as the kernel that asks for it runs."""
     return value
 
 
-# The address of a named tuple, for as long as the kernel that asks for it runs.
-refer = _same if config.DISABLE_JIT else _refer
+def _teach():
+    from percussion_model.physics import reference_types
+    from percussion_model.physics.compiling import instruct
+
+    instruct(refer, reference_types.refer)
+
+
+when_compiling(_teach)

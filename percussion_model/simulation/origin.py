@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +85,8 @@ class Claim:
 
     def sign(self) -> Path:
         """Say in the folder where its files are from, when they are written; return the file."""
+        from importlib.metadata import version  # loads what reads mail
+
         now = _times(self.folder)
         made = [name for name, time in now.items() if self._before.get(name) != time]
         if self._replaces:

@@ -300,7 +300,7 @@ def place_of_kernels(name: str) -> Path | None:
 
     None where they are kept from an earlier time, or where there are none.
     """
-    from percussion_model.physics.kernel import place_to_compile  # loads numba
+    from percussion_model.physics.kernel import place_to_compile
 
     entry = _REGISTRY[name]
     if not entry.kernel:

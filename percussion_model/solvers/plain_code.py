@@ -10,17 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba.extending import overload, register_jitable
-
 from percussion_model.components import COMPONENTS
-from percussion_model.physics.kernel import composed
+from percussion_model.physics.kernel import composed, when_compiling
 from percussion_model.scene import bars, contradictions, rock_law, solver_choice
 from percussion_model.solvers import setup
 from percussion_model.solvers.modal import resolution as modal_resolution
 from percussion_model.solvers.rigid import restitution as rigid_restitution
 from percussion_model.solvers.wave import resolution as wave_resolution
 
-for _function in (
+_FUNCTIONS = (
     bars.section_wave_speed,
     bars.section_impedance,
     bars.section_mass,
@@ -53,11 +51,9 @@ for _function in (
     rigid_restitution.st_venant_restitution,
     rigid_restitution.restitution,
     wave_resolution.steps_for,
-):
-    register_jitable(_function)
+)
 
 
-@overload(bars._plain)
 def _rows(sections):
     return lambda sections: sections
 
@@ -98,7 +94,6 @@ def _and_component(before: Callable, name: str, numbers: Callable) -> Callable:
     return fill
 
 
-@overload(setup.fill_components)
 def _parameters(p, values):
     fill = _nothing
     for one in COMPONENTS:
@@ -109,7 +104,6 @@ def _parameters(p, values):
     return lambda p, values: fill(p, values)
 
 
-@overload(setup.start_components)
 def _states(s, values):
     fill = _nothing
     for one in COMPONENTS:
@@ -119,3 +113,16 @@ def _states(s, values):
             else:
                 fill = _and_constant(fill, field, float(start))
     return lambda s, values: fill(s, values)
+
+
+def _teach() -> None:
+    from numba.extending import overload, register_jitable
+
+    for function in _FUNCTIONS:
+        register_jitable(function)
+    overload(bars._plain)(_rows)
+    overload(setup.fill_components)(_parameters)
+    overload(setup.start_components)(_states)
+
+
+when_compiling(_teach)

@@ -1,6 +1,7 @@
 """Print a digest of what the elementary functions return for fixed arguments, as JSON.
 
-Run by itself to see other machines, or plain Python with NUMBA_DISABLE_JIT=1.
+Run by itself to see other machines, or plain Python with NUMBA_DISABLE_JIT=1; with the word
+`unloaded`, without numba.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import json
 import math
 import random
 import struct
+import sys
 
 from percussion_model.physics import elementary
 
@@ -43,4 +45,8 @@ def digests():
 
 
 if __name__ == "__main__":
+    if "unloaded" not in sys.argv:
+        import numba  # noqa: F401  # functions are compiled
+
     print(json.dumps(digests()))
+    assert ("numba" in sys.modules) == ("unloaded" not in sys.argv)

@@ -283,15 +283,16 @@ def test_bits_are_those_of_every_machine():
 
 
 @pytest.mark.parametrize(
-    "otherwise",
+    ("otherwise", "words"),
     [
-        pytest.param({"NUMBA_DISABLE_JIT": "1"}, id="plain Python"),
-        pytest.param({"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}, id="plainest"),
+        pytest.param({"NUMBA_DISABLE_JIT": "1"}, [], id="plain Python"),
+        pytest.param({}, ["unloaded"], id="without numba"),
+        pytest.param({"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}, [], id="plainest"),
     ],
 )
-def test_bits_depend_on_no_compiler_and_no_processor(otherwise, tmp_path):
+def test_bits_depend_on_no_compiler_and_no_processor(otherwise, words, tmp_path):
     ran = subprocess.run(
-        [sys.executable, str(Path(__file__).with_name("elementary_bits.py"))],
+        [sys.executable, str(Path(__file__).with_name("elementary_bits.py")), *words],
         env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)} | otherwise,
         capture_output=True,
         text=True,

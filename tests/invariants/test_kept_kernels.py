@@ -15,7 +15,7 @@ import percussion_model
 from percussion_model.physics import kept_kernels, user_cache
 from percussion_model.physics.kept_kernels import MOST_KEPT, exchange
 
-RUN = "from percussion_model.physics.elementary import exp; print(exp(1.0))"
+RUN = "from percussion_model.physics.elementary import exp; print(exp.dispatcher(1.0))"
 
 
 @pytest.fixture

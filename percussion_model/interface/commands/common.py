@@ -39,8 +39,6 @@ COLLECT_AFTER = 100_000
 # So many files of a folder have a line each.
 FEW_FILES = 3
 
-_own_process = False
-
 
 class BadValue(typer.BadParameter):
     """A bad value of an option, whose message names the option and is told as it is.
@@ -132,24 +130,10 @@ Tolerance = Annotated[
 
 def own_process() -> None:
     """Let this process start faster; a library must not do so to the process of its caller."""
-    global _own_process
-    _own_process = True
+    from percussion_model.physics import kernel
+
+    kernel.own_process()
     gc.set_threshold(COLLECT_AFTER)
-
-
-def load_numba() -> None:
-    """Load numba without scipy's linear algebra, if the process is our own.
-
-    Numba looks for a BLAS in scipy, whose import takes longer than all of our
-    kernels; none of them calls it.
-    """
-    if not _own_process or "numba" in sys.modules or "scipy.linalg" in sys.modules:
-        return
-    sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
-    try:
-        import numba.np.arraymath  # noqa: F401
-    finally:
-        del sys.modules["scipy.linalg"]
 
 
 def load_scene(
@@ -169,7 +153,6 @@ def load_scene(
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.text import read_setting
 
-    load_numba()
     scene = Scene() if path is None else Scene.from_toml(path)
     changes: dict[str, Any] = rock_changes(rock)
     changes |= dict(read_setting(text) for text in settings or ())

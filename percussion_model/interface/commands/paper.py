@@ -35,7 +35,6 @@ def paper(
 ) -> None:
     """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
     common.check_outputs(out, json_file)
-    common.load_numba()
     try:
         from percussion_model.interface.plotting import paper as _plotting  # noqa: F401
     except ImportError as error:

@@ -37,7 +37,6 @@ def validate(
     from percussion_model.verification.measured import compare, load
 
     common.check_outputs(out, json_file)
-    common.load_numba()
     chosen = load(experiments or ())
     claimed = None
     if out is not None:

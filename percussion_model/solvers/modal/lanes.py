@@ -6,231 +6,58 @@ another, whatever vectors its processor has.
 
 from __future__ import annotations
 
-import operator
-from functools import partial
-
 import numpy as np
-from llvmlite import ir
-from numba import config, types
-from numba.core import cgutils
-from numba.core.datamodel import PrimitiveModel, register_default
-from numba.core.imputils import lower_builtin
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic
+
+from percussion_model.physics.kernel import when_compiling
 
 WIDTH = 8
-_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
-class Lanes(types.Type):  # type: ignore[misc]
-    """Type of eight numbers in kernels."""
-
-    def __init__(self) -> None:
-        super().__init__(name="Eight")
-
-
-@register_default(Lanes)
-class _LanesModel(PrimitiveModel):  # type: ignore[misc]
-    """Kept as one vector."""
-
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, _VECTOR)
-
-
-_lanes = Lanes()
-
-
-def _pointer(context, builder, array_type, array, indices):
-    """Address of an element of a contiguous array as one of a vector."""
-    made = context.make_array(array_type)(context, builder, array)
-    element = cgutils.get_item_pointer(
-        context, builder, array_type, made, indices, wraparound=False, boundscheck=False
-    )
-    return builder.bitcast(element, _VECTOR.as_pointer())
-
-
-@intrinsic
-def _load(typing, array, row, start):
-    def generate(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature.args[0], args[0], [args[1], args[2]])
-        return builder.load(pointer, align=8)
-
-    return _lanes(array, types.intp, types.intp), generate
-
-
-@intrinsic
-def _store(typing, array, row, start, lanes):
-    def generate(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature.args[0], args[0], [args[1], args[2]])
-        builder.store(args[3], pointer, align=8)
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, types.intp, _lanes), generate
-
-
-def _repeat(builder, number):
-    """A vector of one number."""
-    undefined = ir.Constant(_VECTOR, ir.Undefined)
-    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(first, undefined, zeros)
-
-
-@intrinsic
-def _spread(typing, number):
-    def generate(context, builder, signature, args):
-        return _repeat(builder, args[0])
-
-    return _lanes(types.float64), generate
-
-
-def _fold(builder, lanes, join):
-    """Join both halves of a vector, both halves of that, and so on, to one number."""
-    part, width = lanes, WIDTH
-    while width > 1:
-        width //= 2
-        undefined = ir.Constant(part.type, ir.Undefined)
-        kind = ir.VectorType(ir.IntType(32), width)
-        halves = [
-            builder.shuffle_vector(
-                part, undefined, ir.Constant(kind, list(range(start, start + width)))
-            )
-            for start in (0, width)
-        ]
-        part = join(*halves)
-    return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
-
-
-def _pick_lower(builder, one, other):
-    """The lower number of each two."""
-    return builder.select(builder.fcmp_ordered("<", one, other), one, other)
-
-
-@intrinsic
-def _sum(typing, lanes):
-    def generate(context, builder, signature, args):
-        return _fold(builder, args[0], builder.fadd)
-
-    return types.float64(_lanes), generate
-
-
-@intrinsic
-def _sums(typing, one, other):
-    pair = types.UniTuple(types.float64, 2)
-
-    def generate(context, builder, signature, args):
-        undefined, whole = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
-        kind = ir.VectorType(whole, WIDTH)
-        half = WIDTH // 2
-        low, high = (
-            builder.shuffle_vector(
-                *args,
-                ir.Constant(kind, [*range(k, k + half), *range(WIDTH + k, WIDTH + k + half)]),
-            )
-            for k in (0, half)
-        )
-        part, width = builder.fadd(low, high), half
-        while width > 1:
-            width //= 2
-            joined = [
-                ir.Constant(
-                    ir.VectorType(whole, 2 * width),
-                    [
-                        *range(k, k + width),
-                        *range(2 * width + k, 3 * width + k),
-                    ],
-                )
-                for k in (0, width)
-            ]
-            undefined = ir.Constant(part.type, ir.Undefined)
-            low, high = (builder.shuffle_vector(part, undefined, one) for one in joined)
-            part = builder.fadd(low, high)
-        found = [builder.extract_element(part, ir.Constant(whole, place)) for place in range(2)]
-        return context.make_tuple(builder, pair, found)
-
-    return pair(_lanes, _lanes), generate
-
-
-@intrinsic
-def _lower_of(typing, one, other):
-    def generate(context, builder, signature, args):
-        return _pick_lower(builder, *args)
-
-    return _lanes(_lanes, _lanes), generate
-
-
-@intrinsic
-def _lowest(typing, lanes):
-    def generate(context, builder, signature, args):
-        return _fold(builder, args[0], partial(_pick_lower, builder))
-
-    return types.float64(_lanes), generate
-
-
-def _lower(function, instruction):
-    """Make an operator of lanes one instruction: a function of its own would stay a call."""
-
-    @infer_global(function)
-    class Signatures(ConcreteTemplate):
-        cases = [  # noqa: RUF012
-            signature(_lanes, _lanes, _lanes),
-            signature(_lanes, _lanes, types.float64),
-            signature(_lanes, types.float64, _lanes),
-        ]
-
-    def generate(context, builder, signature, args):
-        both = [
-            one if kind is _lanes else _repeat(builder, one)
-            for one, kind in zip(args, signature.args, strict=True)
-        ]
-        return getattr(builder, instruction)(*both)
-
-    for case in Signatures.cases:
-        lower_builtin(function, *case.args)(generate)
-
-
-for _function, _instruction in (
-    (operator.add, "fadd"),
-    (operator.sub, "fsub"),
-    (operator.mul, "fmul"),
-):
-    _lower(_function, _instruction)
-
-
-def _load_numbers(array, row, start):
+def load(array, row, start):
+    """Eight numbers of a row from a place on."""
     return array[row, start : start + WIDTH].copy()
 
 
-def _store_numbers(array, row, start, lanes):
+def store(array, row, start, lanes):
+    """Write eight numbers into a row from a place on."""
     array[row, start : start + WIDTH] = lanes
 
 
-def _spread_number(number):
+def spread(number):
+    """One number eight times."""
     return np.full(WIDTH, number)
 
 
-def _sum_numbers(lanes):
-    total = lanes
-    while len(total) > 1:
-        half = len(total) // 2
-        total = total[:half] + total[half:]
-    return float(total[0])
+def total(lanes):
+    """Sum of eight numbers: of both halves, of both halves of that, and so on."""
+    sums = lanes
+    while len(sums) > 1:
+        half = len(sums) // 2
+        sums = sums[:half] + sums[half:]
+    return float(sums[0])
 
 
-def _sums_of_numbers(one, other):
-    return _sum_numbers(one), _sum_numbers(other)
+def totals(one, other):
+    """`total` of eight numbers and of eight others."""
+    return total(one), total(other)
 
 
-def _lowest_number(lanes):
+def lower_of(one, other):
+    """The lower one of each two numbers."""
+    return np.minimum(one, other)
+
+
+def lowest(lanes):
+    """The lowest of eight numbers."""
     return float(lanes.min())
 
 
-# The same for kernels that run as plain Python.
-_PLAIN = bool(config.DISABLE_JIT)
-load = _load_numbers if _PLAIN else _load
-store = _store_numbers if _PLAIN else _store
-spread = _spread_number if _PLAIN else _spread
-total = _sum_numbers if _PLAIN else _sum
-totals = _sums_of_numbers if _PLAIN else _sums
-lower_of = np.minimum if _PLAIN else _lower_of
-lowest = _lowest_number if _PLAIN else _lowest
+def _teach():
+    from percussion_model.physics.compiling import instruct
+    from percussion_model.solvers.modal import lane_types
+
+    for function in (load, store, spread, total, totals, lower_of, lowest):
+        instruct(function, getattr(lane_types, function.__name__))
+
+
+when_compiling(_teach)
