@@ -17,7 +17,7 @@ from pathlib import Path
 from fmu_src.description import About, write_description
 from fmu_src.staging import LIBRARY, Bundle, script
 from fmu_src.variables import Variable
-from percussion_model.scene.presets import is_clone
+from percussion_model.physics.user_cache import is_clone
 from percussion_model.scene.writing import write_whole
 from percussion_model.simulation.files import reason
 

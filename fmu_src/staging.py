@@ -28,6 +28,8 @@ LIBRARY = Path(pythonfmu.__file__).parent
 MODEL_FILES = (
     "__init__.py",
     "components/*.py",
+    "engine/*.py",
+    "engine/*.[ch]",
     "physics/**/*.py",
     "scene/*.py",
     "simulation/__init__.py",

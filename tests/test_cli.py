@@ -9,16 +9,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
+from percussion_model.engine import library
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.commands import common
 from percussion_model.interface.commands.common import print_message
-from percussion_model.scene.solver_names import SOLVER_NAMES
-from percussion_model.solvers import base
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 RIGID = str(SCENARIOS / "rigid.toml")
@@ -202,55 +200,17 @@ def test_a_bar_shows_what_a_command_waits_for(percussion, command, monkeypatch):
 
 
 def test_who_waits_for_the_compiler_is_told_so_once(percussion, monkeypatch):
-    """Not before each of the scenes that are read before the compiler begins."""
-    monkeypatch.setattr(common, "_told", set())
-    monkeypatch.setattr(base, "place_of_kernels", lambda name: Path("place", "of", "kernels"))
+    """And it is compiled there: not while something is computed."""
+    places, made = [Path("place", "of", "libraries"), None], []
+    monkeypatch.setattr(library, "place_to_compile", lambda name: places.pop(0))
+    monkeypatch.setattr(library, "make", lambda name, report: made.append(name))
     _, _, err = percussion("run", RIGID, *SHORT)
     assert " ".join(err.split()) == (
-        "percussion: compiling the kernels of the solver rigid: once, for about half a minute; "
-        f"they are kept in {Path('place', 'of', 'kernels')}"
+        "percussion: compiling the solver rigid: once, for about a minute; kept in "
+        f"{Path('place', 'of', 'libraries')}"
     )
     assert percussion("run", RIGID, *SHORT)[2] == ""
-
-
-def test_kernels_are_looked_for_where_numba_keeps_them(tmp_path):
-    """In a process with an empty cache: a small kernel before and after its first call."""
-    (tmp_path / "small.py").write_text(
-        "from numba import njit\n@njit(cache=True)\ndef advance(x):\n    return x + 1.0\n"
-    )
-    words = [
-        "import small",
-        "from percussion_model.physics.kernel import place_to_compile as place",
-        "print(place(small.advance)); small.advance(1.0); print(place(small.advance))",
-    ]
-    shown = []
-    for _ in range(2):  # the second process finds what the first has compiled
-        done = subprocess.run(
-            [sys.executable, "-c", "\n".join(words)],
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
-                 "PYTHONPATH": os.pathsep.join([str(tmp_path), str(SCENARIOS.parent)])},
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        shown += done.stdout.split()
-    assert shown[0].startswith(str(tmp_path / "kept"))
-    assert shown[1:] == ["None"] * 3
-
-
-@pytest.mark.parametrize("name", ["wave", "modal", "fem", "rigid"])
-def test_the_kernel_of_every_solver_is_looked_for_where_numba_keeps_it(name, monkeypatch, tmp_path):
-    assert {*SOLVER_NAMES} - {"auto"} <= set(base._REGISTRY)
-    entry = base._REGISTRY[name]
-    kernels = importlib.import_module(f"{entry.module.rpartition('.')[0]}.advance")
-    kernel = getattr(kernels, entry.kernel)
-    numbas_name = kernel._cache._impl.filename_base
-    empty = SimpleNamespace(
-        stats=SimpleNamespace(cache_path=str(tmp_path)), overloads={}, __code__=kernel.__code__,
-        __module__=kernel.__module__, __qualname__=kernel.__qualname__,
-    )  # fmt: skip
-    monkeypatch.setattr(kernels, entry.kernel, empty)
-    assert base.place_of_kernels(name) == tmp_path
-    (tmp_path / f"{numbas_name}.nbi").touch()
-    assert base.place_of_kernels(name) is None
+    assert made == ["rigid"]
 
 
 def test_new_writes_a_scene_that_runs_and_keeps_existing_files(percussion, tmp_path):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation, simulate
+from percussion_model.engine.solvers import ModalSolver
 from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.bars import bar_mass, bar_transit_time
@@ -26,7 +27,7 @@ from percussion_model.solvers.modal.modes import (
     with_residual,
 )
 from percussion_model.solvers.modal.records import STEP, Shape
-from percussion_model.solvers.modal.solver import ModalSolver
+from tests.engine_views import Tables
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 ROOT = Path(__file__).parents[1]
@@ -153,7 +154,7 @@ def test_what_falls_below_zero_between_two_looks_is_found():
 
 
 def made(cells=20, **changes):
-    return ModalSolver(modal(cells=cells, **changes))._tables
+    return Tables(ModalSolver(modal(cells=cells, **changes)))
 
 
 def test_what_a_bar_loses_is_what_its_energy_lacks():

@@ -11,6 +11,7 @@ from percussion_model import Scene, Simulation, simulate
 from percussion_model.physics.records import Mode
 from percussion_model.solvers.modal.records import Shape
 from percussion_model.verification.hard_cases import hard_cases
+from tests.engine_views import Tables
 
 ON_ROCK = 1  # form of the bit alone on K_R
 
@@ -36,7 +37,7 @@ def first_peak(scene: Scene) -> float:
 
 def integrated_peak(scene: Scene) -> float:
     """The same by a general integrator, with the modes of the solver [N]."""
-    forms = Simulation(scene).solver._tables.forms
+    forms = Tables(Simulation(scene).solver).forms
     n, held = forms.sizes[ON_ROCK], forms.stiff[ON_ROCK]
     shape = forms.shape[ON_ROCK, :, :n]
     low, stiff, bit = shape[Shape.LOW], shape[Shape.STIFF], shape[Shape.BIT]

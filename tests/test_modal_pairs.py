@@ -8,9 +8,10 @@ from scipy.integrate import cumulative_simpson
 from scipy.linalg import expm
 
 from percussion_model import Scene, Simulation, simulate
+from percussion_model.engine.solvers import ModalSolver
 from percussion_model.solvers.modal.damped import damped_pairs
 from percussion_model.solvers.modal.modes import bar_modes, shape_low
-from percussion_model.solvers.modal.solver import ModalSolver
+from tests.engine_views import Tables
 
 STEEL = 2.1e11, 7850.0
 UNIFORM = np.array([[0.2, 5.5e-3, *STEEL]])
@@ -86,9 +87,9 @@ def modal(**changes):
 
 def test_a_strong_dashpot_is_stepped_and_drills_as_by_waves():
     changes = {"rock.barrier_damping": 4e5, "rock.barrier_energy": 0.5}
-    solver = ModalSolver(modal(**changes))
-    assert solver._tables.laws.sizes[2] > 0  # loading without the dashpot
-    assert solver._tables.laws.sizes[3] == 0
+    tables = Tables(ModalSolver(modal(**changes)))
+    assert tables.laws.sizes[2] > 0  # loading without the dashpot
+    assert tables.laws.sizes[3] == 0
     finer = modal(**changes, **{"solver.cells": 40})
     ours = simulate(finer, error_estimate=False).rate_of_penetration
     waves = Scene().replace(**changes, **{"solver.cells": 80})
@@ -116,11 +117,12 @@ def test_steps_and_pairs_tell_the_same_of_a_blow(changes):
     exact = Simulation(scene, record_events=False)
     exact.advance(0.03)
     stepped = Simulation(scene, record_events=False)
-    stepped.solver._tables.laws.sizes[:], kept = 0, stepped.solver._tables.laws.sizes.copy()
+    sizes = Tables(stepped.solver).laws.sizes
+    sizes[:], kept = 0, sizes.copy()
     try:
         stepped.advance(0.03)
     finally:
-        stepped.solver._tables.laws.sizes[:] = kept
+        sizes[:] = kept
     assert stepped.statistics()["steps"] > exact.statistics()["steps"]
     one, other = exact.energy(), stepped.energy()
     assert abs(one["residual_relative"]) < 1e-12
@@ -138,7 +140,7 @@ def test_changes_of_mode_in_one_product_are_those_by_way_of_the_modes():
     scene = modal(**{"feed.force": 3000.0})
     direct = Simulation(scene)
     direct.advance(8e-3)
-    way = direct.solver._tables.laws.way
+    way = Tables(direct.solver).laws.way
     assert np.count_nonzero(way >= 0) == 14
     kept = way.copy()
     by_modes = Simulation(scene)

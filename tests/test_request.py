@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, simulate
+from percussion_model.engine.solvers import ModalSolver
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
 from percussion_model.solvers.modal.resolution import modes_for, most_modes
-from percussion_model.solvers.modal.solver import ModalSolver
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}

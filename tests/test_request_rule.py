@@ -70,7 +70,7 @@ def test_rule_counts_the_modes_of_the_shorter_bar():
 
 def test_solver_takes_the_steps_of_the_rule_in_library_and_fmu():
     from fmu_src.hammer.variables import hammer_variables
-    from percussion_model.solvers.wave.solver import WaveSolver
+    from percussion_model.engine.solvers import WaveSolver
 
     scene = Scene().replace(**{"solver.accuracy": 1e-3})
     assert WaveSolver(scene).cells == {"piston": 240, "bit": 276}

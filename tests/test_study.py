@@ -19,10 +19,10 @@ from percussion_model import Scene, SceneError, settled
 from percussion_model.analysis.study import Study, grid, study, table, workers
 from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
+from percussion_model.engine import solver as engine
 from percussion_model.interface.cli import INTERRUPTED, _guarded, app
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import sources
-from percussion_model.solvers.modal import solver as modal
 
 SCENE = Scene(title="rigid bodies").computed_by("rigid")
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
@@ -50,7 +50,7 @@ def test_bits_do_not_depend_on_the_threads_of_linear_algebra(solver):
     threadpoolctl = pytest.importorskip("threadpoolctl")
     scene, found = Scene().computed_by(solver), []
     for threads in (1, 2):
-        modal._kept.clear()
+        engine._kept.clear()
         with threadpoolctl.threadpool_limits(threads):
             rows, _ = run_points(scene, ("solver.cells",), np.array([[40.0]]), 1e-4, 400, 1e-3)
         found.append(rows)

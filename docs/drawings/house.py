@@ -22,7 +22,7 @@ AROUND = ("fmu_src", "scenarios", "benchmarks", "examples")
 # Where a run passes: what it is called, what it is, its layer, and the share of the width there.
 WAY = (
     ("Scene", "parameters, checked", "scene", (0.0, 0.47)),
-    ("solver", "a state, and how it advances", "solvers", (0.0, 0.47)),
+    ("solver", "a state, and how it advances", "engine", (0.0, 0.47)),
     ("Simulation", "time, inputs, snapshots", "simulation", (0.0, 0.47)),
     ("Result", "blows, events, ledger", "simulation", (0.53, 1.0)),
     ("commands", "tables, figures, reports", "interface", (0.53, 1.0)),
@@ -33,7 +33,8 @@ BETWEEN = re.compile(" [|:] ")
 RUN = "#0072B2"
 COLOURS = {
     "interface": "#FBE5D6", "verification": "#F7EBC8", "coupling": "#F7EBC8",
-    "analysis": "#E4EFD9", "simulation": "#D5ECE4", "solvers": "#D6E8F3", "scene": "#DCE6EE",
+    "analysis": "#E4EFD9", "simulation": "#D5ECE4", "engine": "#D5E8EC", "solvers": "#D6E8F3",
+    "scene": "#DCE6EE",
     "physics": "#E8E3F0", "components": "#E8E3F0",
 }  # fmt: skip
 

@@ -28,11 +28,12 @@ from fmu_src.slave.states import (
     unpack_values,
 )
 from fmu_src.variables import closed_bounds
+from percussion_model.engine.library import place_to_compile
 from percussion_model.scene.inputs import INPUTS, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers.base import Solver, compiling_takes, place_of_kernels
+from percussion_model.solvers.base import Solver
 from percussion_model.solvers.cells import find_cell
 
 # Solvers hold no state: instances of equal parameters share one.
@@ -118,12 +119,9 @@ class PercussiveHammer(Slave):
     def foretell(self) -> None:
         """Log that kernels are going to be compiled, where they are not kept yet."""
         solver = self.make_scene(self.values).solver_name
-        place = place_of_kernels(solver)
+        place = place_to_compile(solver)
         if place is not None:
-            self.note(
-                f"compiling the kernels of the solver {solver}: once, for "
-                f"about {compiling_takes(solver)}; they are kept in {place}"
-            )
+            self.note(f"compiling the solver {solver}: once, for about a minute; kept in {place}")
 
     def initialise(self) -> Motion:
         """Solver and state; made at time zero for the present values where there are none."""

@@ -12,28 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fmu_src.native import kinds
-from fmu_src.native.image import (
-    AT,
-    Own,
-    fill_values,
-    gauge_sections,
-    has_rods,
-    numbers_at,
-    own_numbers,
-    row_of,
-)
-from fmu_src.native.layout import (
-    MOTION_BYTES,
-    GaugeBar,
-    Kind,
-    Left,
-    blow_records,
-    head_records,
-    motion_of,
-    motion_records,
-)
-from fmu_src.native.memory import floats_at, hold, words_at
-from fmu_src.native.messages import FIRST_RULE, Fault, Note, keys_in
+from fmu_src.native.messages import Note
 from fmu_src.native.motion import (
     COUNT,
     NEW_INPUTS,
@@ -44,6 +23,19 @@ from fmu_src.native.motion import (
 from fmu_src.native.notes import add_note, look, set_fault
 from fmu_src.native.outputs import OUTPUT_COUNT, fill_outputs
 from fmu_src.native.solvers import kind_of
+from percussion_model.engine.fault_texts import FIRST_RULE, keys_in
+from percussion_model.engine.faults import Fault
+from percussion_model.engine.image import (
+    fill_values,
+    gauge_sections,
+    has_rods,
+    numbers_at,
+    own_numbers,
+)
+from percussion_model.engine.layout import blow_records, head_records, motion_of, motion_records
+from percussion_model.engine.memory import floats_at, hold, words_at
+from percussion_model.engine.records import MOTION_BYTES, GaugeBar, Kind, Left
+from percussion_model.engine.scene_image import AT, Own, row_of
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import BLOW, TURNS, Piston, Status
 from percussion_model.physics.state import LARGEST, MOST
@@ -102,7 +94,7 @@ def _words(fields: Sequence[str]) -> tuple[tuple[int, ...], ...]:
 
 INPUTS_AT = _words(FIELDS)
 PEAKS_AT = _words(("peak_from", "peak_bit_force", "peak_contact_force"))
-GUARDS_AT = _words(("count_locked", "count_storms"))
+GUARDS_AT = _words(("count_locked", "count_storms", "inputs_changed"))
 
 
 @preparing
@@ -217,7 +209,7 @@ def _check_values(image, values, notes):
     if kind_of(numbers) == 0:
         return set_fault(notes, Fault.SOLVER.value, np.zeros(4))
     facts = np.zeros(4)
-    fault = kinds.refuse(kind_of(numbers), numbers, facts)
+    fault = kinds.refuse(kind_of(numbers), image, facts.ctypes.data)
     if fault > 0:
         return set_fault(notes, fault, facts)
     own = own_numbers(image)
@@ -248,14 +240,14 @@ def create(image, motion, notes):
     kind, facts = kind_of(numbers), np.zeros(4)
     if kind == Kind.RIGID:
         bar = GaugeBar.NONE.value
-    base = kinds.create(kind, numbers, bar, place)
+    base = kinds.create(kind, image, bar, place)
     if base == 0:
         return set_fault(notes, Fault.MEMORY.value, facts)
     head = head_records(base, 1)[0]
     for k in range(COUNT):
         head.inputs_at[k] = INPUTS_AT[kind][k]
     head.peak_from_at, head.peak_bit_at, head.peak_contact_at = PEAKS_AT[kind]
-    head.locked_at, head.storms_at = GUARDS_AT[kind]
+    head.locked_at, head.storms_at, head.changed_at = GUARDS_AT[kind]
     head.rock = ROCKS[numbers.values.effects_rock]
     _fill_bend(head, numbers.values)
     _fill_acts(head, numbers, values)
@@ -342,7 +334,17 @@ def find_fault(motion, state, t, notes):
         return set_fault(notes, Fault.MOTION.value, facts)
     if not kinds.state_time(motion, state) <= m.time + MOST_AHEAD:
         return set_fault(notes, Fault.MOTION.value, facts)
-    number = kinds.find_fault(motion, state, m.time, facts)
+    number = kinds.find_fault(motion, state, m.time, facts.ctypes.data)
     if number > 0:
         set_fault(notes, number, facts)
     return number
+
+
+# What the shell calls: function, and its result and arguments as in `engine.entries`.
+EXPORTED = {
+    "kernel_check": ("check", "w:ww"),
+    "kernel_create": ("create", "w:www"),
+    "kernel_step": ("take_step", "w:wwwnnww"),
+    "kernel_read": ("read_outputs", "w:www"),
+    "kernel_fault": ("find_fault", "w:wwnw"),
+}

@@ -1,4 +1,5 @@
 /* The kernels, compiled elsewhere, for the processor on which the library runs. */
+#include "processor.h"
 #include "shell.h"
 
 /* Hidden: two libraries in a process must not take each other's. COFF hides all that is not
@@ -23,23 +24,7 @@
 DECLARE(_base)
 
 #if defined(HAVE_AVX2_KERNELS) && (defined(__x86_64__) || defined(_M_X64))
-#include <cpuid.h>
-
 DECLARE(_avx2)
-
-/* Whether processor and system have AVX2, and BMI as all processors with it. */
-static bool has_avx2(void) {
-    uint32_t a, b, c, d, low, high;
-    const uint32_t xsave = 1u << 27, avx2 = 1u << 5, bmi = 1u << 3 | 1u << 8;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & xsave) == 0) {
-        return false;
-    }
-    __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
-    if ((low & 6) != 6) { /* the system does not keep the wide registers */
-        return false;
-    }
-    return __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & avx2) != 0 && (b & bmi) == bmi;
-}
 
 Kernels kernels_of_machine(void) { return has_avx2() ? KERNELS(_avx2) : KERNELS(_base); }
 #else

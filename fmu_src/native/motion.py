@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 from fmu_src.native import kinds
-from fmu_src.native.layout import (
-    ADVANCE,
-    BLOW_ROOM,
-    COMMIT,
-    Left,
+from percussion_model.engine.layout import (
     blow_records,
+    copy_words,
     head_records,
     last_blow,
     motion_of,
-    other_reading,
+    other_reading_at,
+    reading_at,
     reading_of,
+    reading_records,
 )
-from fmu_src.native.memory import floats_at, words_at
+from percussion_model.engine.memory import floats_at, words_at
+from percussion_model.engine.records import ADVANCE, BLOW_ROOM, COMMIT, Left
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Status
 from percussion_model.scene.inputs import INPUTS
@@ -50,10 +50,7 @@ def count_of(base, word):
 @preparing
 def _carry(base, source, to):
     """Copy what moves from one place of the memory to another."""
-    count = head_records(base, 1)[0].state_bytes // 8
-    there, here = words_at(base + to, count), words_at(base + source, count)
-    for k in range(count):  # an assignment of all would look first whether they overlap
-        there[k] = here[k]
+    copy_words(base + source, base + to, head_records(base, 1)[0].state_bytes // 8)
 
 
 @preparing
@@ -86,14 +83,10 @@ def settle_before(base):
     motion, head = motion_of(base), head_records(base, 1)[0]
     if motion.left == Left.NOWHERE:
         return
-    at = head.left_at
-    if motion.left == Left.HERE:
-        at = head.trial_at
-        _copy(base, at)
-    row = other_reading(base)
-    t = max(motion.left_time, kinds.state_time(base, base + at))
-    kinds.read(base, base + at, t, row, False)
-    _take_impulses(motion, row[0])
+    at = base + (head.state_at if motion.left == Left.HERE else head.left_at)
+    t = max(motion.left_time, kinds.state_time(base, at))
+    kinds.read(base, at, base + head.trial_at, t, other_reading_at(base), False)
+    _take_impulses(motion, reading_records(other_reading_at(base), 1)[0])
 
 
 @preparing
@@ -246,10 +239,10 @@ def read(base, peaks):
     motion, head, row = motion_of(base), head_records(base, 1)[0], reading_of(base)
     if motion.is_read == 1 and (head.has_peaks == 1 or not peaks):
         return row
-    at = base + head.here_at
-    _copy(base, head.here_at)
+    at = base + head.state_at
     # after a change of inputs a state may lie a step ahead
-    kinds.read(base, at, max(motion.time, kinds.state_time(base, at)), row, peaks)
+    t = max(motion.time, kinds.state_time(base, at))
+    kinds.read(base, at, base + head.here_at, t, reading_at(base), peaks)
     head.has_peaks = 1 if peaks else 0
     if motion.is_read == 0:
         motion.is_read, head.has_stress = 1, 0

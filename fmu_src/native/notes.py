@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fmu_src.native.layout import head_records, last_blow, motion_of
-from fmu_src.native.memory import floats_at, words_at
 from fmu_src.native.messages import Note
 from fmu_src.native.motion import count_of, read
 from fmu_src.native.outputs import numerical, residual
+from percussion_model.engine.layout import head_records, last_blow, motion_of
+from percussion_model.engine.memory import floats_at, words_at
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.power_law import secant_stiffness
 from percussion_model.physics.records import Mode, RockKind

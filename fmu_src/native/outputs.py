@@ -6,13 +6,13 @@ import numpy as np
 
 from fmu_src.hammer.motion import INSTANT, NO_CONTACT
 from fmu_src.hammer.outputs import OUTPUTS, OfBlow, Sample
-from fmu_src.native.layout import last_blow, motion_of
 from fmu_src.native.motion import (
     rate_decay,
     read,
     read_stress,
     settle_before,
 )
+from percussion_model.engine.layout import last_blow, motion_of
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.ledger import DISSIPATED, NUMERICAL, STORED, WORKS
 from percussion_model.physics.records import BLOW, READING, Mode

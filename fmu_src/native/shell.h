@@ -89,7 +89,7 @@ enum {
     DIRECTORY_BEGIN = 5, /* rows whose first word is an offset of an array */
     DIRECTORY_ROWS = 6,
     DIRECTORY_WORDS = 7,
-    SHARED = 8 /* for memory.c */
+    SHARED = 8 /* for shared.c */
 };
 
 /* All return 0, or the number of a fault. A step gives the time that it has reached, and how many
@@ -106,7 +106,13 @@ typedef struct {
 /* Those for this processor. */
 Kernels kernels_of_machine(void);
 
-/* ---- memory.c: memory that kernels ask for ---------------------------------------- */
+/* ---- memory.c of the engine: memory that kernels ask for ---------------------------- */
+
+/* Memory of zeros; 0 where there is none left. */
+int64_t native_allocate(int64_t size);
+void native_free(int64_t memory);
+
+/* ---- shared.c: tables that equal motions share -------------------------------------- */
 
 /* Give back a motion. */
 void free_motion(int64_t *motion);

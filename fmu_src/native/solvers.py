@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fmu_src.native.image import row_of
-from fmu_src.native.layout import KINDS, Kind
+from percussion_model.engine.records import KINDS, Kind
+from percussion_model.engine.scene_image import row_of
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import bar_transit_time

@@ -18,6 +18,7 @@ from fmu_src.hammer.variables import TABLE_INPUTS, gauge_bars, hammer_variables
 from fmu_src.native import messages
 from fmu_src.native.variables3 import Variable3, fmi3_variables
 from fmu_src.variables import Variable, closed_bounds
+from percussion_model.engine.fault_texts import faults as faults_of
 from percussion_model.scene.numbers import (
     JOINT_KINDS,
     scene_numbers,
@@ -139,7 +140,7 @@ def model_tables(
         Templates of messages, the first unused; those of `fmu_src.native.messages` if left out.
     """
     if faults is None or notes is None:
-        faults, notes = messages.faults(gauge_bars(scene)), messages.notes()
+        faults, notes = faults_of(gauge_bars(scene)), messages.notes()
     return _Writer(scene).write(guid, faults, notes)
 
 

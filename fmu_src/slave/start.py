@@ -72,7 +72,7 @@ def native_class(resources: Path) -> Any:
     reason = native.reason_against(str(resources))
     if not reason:
         return class_of(NATIVE, "NativeSlave")
-    note = f"runs by numba, whose kernels are compiled for minutes unless they are kept: {reason}"
+    note = f"runs by Python, and compiles its solver for a minute unless that is kept: {reason}"
     if note not in told:
         told.add(note)
         notes.append(note)

@@ -10,14 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.engine.solvers import WaveSolver
 from percussion_model.physics.records import EventKind
 from percussion_model.scene.bar_groups import Bar
+from percussion_model.scene.bars import section_impedance
 from percussion_model.scene.inputs import SimulationError
+from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.solvers.state import State
 from percussion_model.solvers.wave.records import Has
-from percussion_model.solvers.wave.solver import WaveSolver
 
 # Whole blows that means need.
 FEWEST_BLOWS = 3
@@ -389,6 +391,10 @@ def _watched(
     force: dict[str, list[np.ndarray]] = {name: [] for name in grids}
     kinetic: dict[str, list[float]] = {name: [] for name in grids}
     elastic: dict[str, list[float]] = {name: [] for name in grids}
+    impedance = {
+        name: np.repeat(list(map(section_impedance, section_numbers(bars[name]))), grid.in_sections)
+        for name, grid in grids.items()
+    }
     for k in range(count):
         simulation.advance((first + k) * step)
         fields = simulation.fields()
@@ -396,7 +402,7 @@ def _watched(
             f, v = fields[f"{name}_force"], fields[f"{name}_velocity"]
             force[name].append(f)
             kinetic[name].append(0.5 * float(grid.mass @ (v * v)))
-            strain = f / grid.impedance
+            strain = f / impedance[name]
             elastic[name].append(0.5 * float(grid.mass @ (strain * strain)))
     shapes = {name: _cells(bars[name], grid.in_sections) for name, grid in grids.items()}
     return WatchedBlow(

@@ -37,7 +37,7 @@ LARGEST = 2.0**31
 # The highest status of a call that did what it should.
 WARNING = 1
 # What FMUs of this project say before they compile; others log what they like.
-COMPILING = "compiling the kernels"
+COMPILING = "compiling the solver"
 _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 

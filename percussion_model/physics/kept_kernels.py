@@ -106,8 +106,8 @@ def _tell(components: list[str]) -> None:
     """Say why all kernels are compiled anew: components that came or went, or other sources."""
     why = f"components ({', '.join(components)})" if components else "sources of the package"
     _log.warning(
-        "%s have changed: a solver's kernels are compiled anew when it is first used, for about "
-        "a minute, and an FMU's library for some ten; those of before are kept",
+        "%s have changed: kernels are compiled anew when they are first used; those of before "
+        "are kept",
         why,
     )
 

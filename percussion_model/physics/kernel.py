@@ -12,7 +12,6 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from types import MethodType, ModuleType
 from typing import Any
 
@@ -149,21 +148,6 @@ def compiled(*, is_scalar: bool = False, is_kept: bool = True, **options: Any) -
         return function if DISABLED else Kernel(function, is_scalar, is_kept, options)
 
     return decorate
-
-
-def place_to_compile(function: Callable) -> Path | None:
-    """Folder in which numba will keep a kernel once it is compiled; None where it does so already.
-
-    A kernel counts as kept where numba's index of it is there. None as well where nothing is
-    compiled, or kept. Loads numba, which knows the folder.
-    """
-    place = getattr(getattr(function, "stats", None), "cache_path", None)
-    if place is None or getattr(function, "overloads", None):
-        return None
-    module, code = function.__module__.rpartition(".")[2], function.__code__
-    name = f"{module}.{function.__qualname__}-{code.co_firstlineno}."
-    folder = Path(place)
-    return None if any(one.name.startswith(name) for one in folder.glob("*.nbi")) else folder
 
 
 _entries: dict[Callable, Callable] = {}

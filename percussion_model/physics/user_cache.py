@@ -40,6 +40,12 @@ def cache_folder() -> Path:
     return base / NAME
 
 
+def is_clone() -> bool:
+    """Whether this is a clone of the repository, and not an installed package, or an FMU's."""
+    beside = Path(__file__).resolve().parents[2]
+    return (beside / "scenarios").is_dir() and not (beside / "percussion_scenarios").is_dir()
+
+
 def can_write(folder: Path) -> bool:
     """Whether files can be made in a folder, which need not be there yet."""
     there = next(one for one in (folder, *folder.absolute().parents) if os.path.exists(one))

@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -244,24 +243,20 @@ class Entry(NamedTuple):
     Attributes
     ----------
     module, factory : str
-        A class or a function of the scene. Its kernels are loaded only when it is used,
-        which is most of a start.
-    kernel : str
-        Name of the kernel that takes longest to compile, in the module `advance` beside
-        that one; empty where there is none.
+        A class or a function of the scene.
     """
 
     module: str
     factory: str
-    kernel: str = ""
 
 
-_HERE = __name__.rpartition(".")[0]
+_PACKAGE = __name__.rpartition(".solvers.")[0]
+_ENGINE = f"{_PACKAGE}.engine.solvers"
 _REGISTRY = {
-    "wave": Entry(f"{_HERE}.wave.solver", "WaveSolver", "run"),
-    "modal": Entry(f"{_HERE}.modal.solver", "ModalSolver", "run"),
-    "fem": Entry(f"{_HERE}.fem.solver", "FemSolver", "run"),
-    "rigid": Entry(f"{_HERE}.rigid.solver", "RigidSolver", "advance"),
+    "wave": Entry(_ENGINE, "WaveSolver"),
+    "modal": Entry(_ENGINE, "ModalSolver"),
+    "fem": Entry(_ENGINE, "FemSolver"),
+    "rigid": Entry(_ENGINE, "RigidSolver"),
 }
 
 
@@ -285,7 +280,7 @@ def register(
 
 def added_solvers() -> dict[str, Entry]:
     """Solvers that are not a part of this package, by name."""
-    return {k: entry for k, entry in _REGISTRY.items() if not entry.module.startswith(_HERE)}
+    return {k: entry for k, entry in _REGISTRY.items() if entry.module != _ENGINE}
 
 
 def make_solver(scene: Scene) -> Solver:
@@ -293,22 +288,3 @@ def make_solver(scene: Scene) -> Solver:
     entry = _REGISTRY[scene.solver_name]
     factory: Callable[[Scene], Solver] = getattr(import_module(entry.module), entry.factory)
     return factory(scene)
-
-
-def place_of_kernels(name: str) -> Path | None:
-    """Folder into which the kernels of a solver will be compiled (`compiling_takes`).
-
-    None where they are kept from an earlier time, or where there are none.
-    """
-    from percussion_model.physics.kernel import place_to_compile
-
-    entry = _REGISTRY[name]
-    if not entry.kernel:
-        return None
-    kernels = import_module(f"{entry.module.rpartition('.')[0]}.advance")
-    return place_to_compile(getattr(kernels, entry.kernel))
-
-
-def compiling_takes(name: str) -> str:
-    """About how long the kernels of a solver take to be compiled."""
-    return "a minute" if name == "modal" else "half a minute"

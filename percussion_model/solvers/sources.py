@@ -8,7 +8,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 # Kernels and solvers.
-SOLVING = ("components/*.py", "physics/**/*.py", "solvers/**/*.py")
+SOLVING = ("components/*.py", "engine/*.py", "physics/**/*.py", "solvers/**/*.py")
 
 
 def source_files(patterns: Iterable[str] = SOLVING) -> list[Path]:

@@ -31,13 +31,21 @@ def words_of(dtype: np.dtype) -> dict[str, int]:
     return {name: int(place[1]) // 8 for name, place in (dtype.fields or {}).items()}
 
 
-def aligned(array: np.ndarray) -> np.ndarray:
-    """A copy that begins where a line of a processor's cache does: vectors load faster."""
-    room = np.zeros(array.nbytes + LINE, np.uint8)
+def aligned_bytes(count: int) -> np.ndarray:
+    """So many bytes of zeros, from where a line of a processor's cache begins: vectors load faster.
+
+    Returns
+    -------
+    uint8 array
+    """
+    room = np.zeros(count + LINE, np.uint8)
     start = -room.ctypes.data % LINE
-    copy = room[start : start + array.nbytes].view(array.dtype).reshape(array.shape)
-    copy[...] = array
-    return copy
+    return room[start : start + count]
+
+
+def _lines(count: int) -> int:
+    """Bytes of so many, in whole lines."""
+    return (count + LINE - 1) // LINE * LINE
 
 
 class State:
@@ -48,52 +56,65 @@ class State:
     dtype : dtype
         Of the record; all fields are words of eight bytes, or rows of them.
     shapes : tuple of (int, int)
-        Of the arrays that the workspace holds one after the other.
-    words, workspace : ndarray, optional
-        Memory of both; zeros if left out.
+        Of the arrays that follow the record, each from a whole line of a cache on.
+    begin : int
+        Place of the record in the memory [bytes].
+    memory : bytes, optional
+        Of all; zeros if left out.
 
     Attributes
     ----------
+    memory : uint8 array
+    address : int
+        Of the memory.
     record : ndarray of dtype, shape (1,)
     words, numbers : int64 and float64 array
         The record word by word: NumPy copies a record of many fields a hundred
         times slower, and takes its time to read one of them.
-    workspace : float array
-    arrays : tuple of float array
-        The workspace in the given shapes.
     """
 
-    __slots__ = ("arrays", "dtype", "numbers", "record", "shapes", "words", "workspace")
+    __slots__ = ("address", "begin", "dtype", "memory", "numbers", "record", "shapes", "words")
 
     def __init__(
         self,
         dtype: np.dtype,
         shapes: tuple[tuple[int, int], ...] = (),
-        words: np.ndarray | None = None,
-        workspace: np.ndarray | None = None,
+        begin: int = 0,
+        memory: bytes | None = None,
     ) -> None:
-        if words is None or workspace is None:
-            words = np.zeros(dtype.itemsize // 8, np.int64)
-            workspace = aligned(np.zeros(sum(rows * columns for rows, columns in shapes)))
-        self.dtype, self.shapes, self.words, self.workspace = dtype, shapes, words, workspace
-        self.record = np.ndarray(1, dtype, words)  # a view does it too, but takes ten times as long
-        self.numbers = words.view(np.float64)
-        arrays, end = [], 0
-        for rows, columns in shapes:
-            start, end = end, end + rows * columns
-            arrays.append(workspace[start:end].reshape(rows, columns))
-        self.arrays = tuple(arrays)
+        self.dtype, self.shapes, self.begin = dtype, shapes, begin
+        size = _lines(begin + dtype.itemsize)
+        self.memory = aligned_bytes(size + sum(_lines(8 * rows * n) for rows, n in shapes))
+        if memory is not None:
+            self.memory[:] = np.frombuffer(memory, np.uint8)
+        self.address = self.memory.ctypes.data
+        self.words = self.memory[begin : begin + dtype.itemsize].view(np.int64)
+        self.record = np.ndarray(1, dtype, self.words)  # a view takes ten times as long
+        self.numbers = self.words.view(np.float64)
+
+    @property
+    def workspace(self) -> np.ndarray:
+        """All that follows the record, as numbers."""
+        return self.memory[_lines(self.begin + self.dtype.itemsize) :].view(np.float64)
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """The workspace in the given shapes."""
+        arrays, end = [], _lines(self.begin + self.dtype.itemsize)
+        for rows, columns in self.shapes:
+            size = 8 * rows * columns
+            arrays.append(self.memory[end : end + size].view(np.float64).reshape(rows, columns))
+            end += _lines(size)
+        return tuple(arrays)
 
     def copy(self, spare: State | None = None) -> State:
         """An independent copy, in the memory of an old one where that is given."""
-        if spare is None:
-            return State(self.dtype, self.shapes, self.words.copy(), aligned(self.workspace))
-        spare.words[:] = self.words
-        spare.workspace[:] = self.workspace
-        return spare
+        copy = State(self.dtype, self.shapes, self.begin) if spare is None else spare
+        copy.memory[:] = self.memory
+        return copy
 
     def __reduce__(self) -> tuple[object, ...]:
-        return State, (self.dtype, self.shapes, self.words, self.workspace)
+        return State, (self.dtype, self.shapes, self.begin, self.memory.tobytes())
 
 
 class LimitRows(NamedTuple):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation
+from percussion_model.engine.solvers import WaveSolver
 from percussion_model.physics.ledger import complete_ledger, energies
 from percussion_model.physics.records import BLOW, EVENT, READING
 from percussion_model.solvers.wave.records import Has
-from percussion_model.solvers.wave.solver import WaveSolver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.explicit_joints import POSITION
 

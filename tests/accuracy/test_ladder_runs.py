@@ -371,7 +371,7 @@ def test_what_is_compiled_is_told_by_name(monkeypatch):
 
     said = []
     monkeypatch.setattr(
-        study_module, "place_of_kernels", lambda name: "a place" if name == "wave" else None
+        study_module, "place_to_compile", lambda name: "a place" if name == "wave" else None
     )
     made = SimpleNamespace(setup_time=0.0)
     monkeypatch.setattr(study_module, "Simulation", lambda scene: made)

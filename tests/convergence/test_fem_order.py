@@ -7,10 +7,11 @@ import pytest
 from scipy.linalg import eigh, expm
 
 from percussion_model import Mode, Scene, Simulation
+from percussion_model.engine.solvers import FemSolver
 from percussion_model.physics.ledger import energies
 from percussion_model.physics.records import BLOW, EVENT, READING
 from percussion_model.solvers.fem.records import Node
-from percussion_model.solvers.fem.solver import FemSolver
+from tests.engine_views import refresh_nodes
 
 # The bit alone on a linear spring, with weight, feed and loss.
 BIT = {
@@ -75,9 +76,9 @@ def test_order_in_time_with_damping_and_forcing(radius, declared):
         solver = FemSolver(scene)
         state = solver.new_state()
         state.record[0]["mode"] = Mode.FC
-        nodes = state.workspace.reshape(len(Node), -1)
+        nodes = state.arrays[0]
         nodes[Node.U], nodes[Node.V] = u, v
-        solver.refresh(state)
+        refresh_nodes(solver, state)
         solver.commit(state, t, *ROOM)
         assert solver.statistics(state)["steps"] == count
         off = np.concatenate([(nodes[Node.U] - u_end) / 1e-4, (nodes[Node.V] - v_end) / 2.0])
@@ -143,10 +144,10 @@ def test_order_of_the_mesh():
     for n in counts:
         solver = FemSolver(base.replace(**{"fem.elements": int(n), "fem.courant": 0.1}))
         state = solver.new_state()
-        nodes = state.workspace.reshape(len(Node), -1)
+        nodes = state.arrays[0]
         shape = np.cos(wave * np.linspace(0.0, section.length, n + 1))
         nodes[Node.V] = shape
-        solver.refresh(state)
+        refresh_nodes(solver, state)
         solver.commit(state, t, *ROOM)
         fade = np.exp(-rate * t)
         closed = fade * (np.cos(swing * t) - rate / swing * np.sin(swing * t)) * shape
@@ -174,10 +175,10 @@ def test_stable_at_fifty_times_the_cfl_step(radius):
     solver = FemSolver(scene)
     state = solver.new_state()
     state.record[0]["mode"] = Mode.FC
-    nodes = state.workspace.reshape(len(Node), -1)
+    nodes = state.arrays[0]
     nodes[Node.U] = 1e-2  # pressed in for good
     nodes[Node.V] = np.random.default_rng(1).uniform(-1.0, 1.0, nodes.shape[1])
-    solver.refresh(state)
+    refresh_nodes(solver, state)
     stored, reading = [], np.zeros(1, READING)
     for k in range(400):
         solver.commit(state, (k + 1) * solver.time_step, *ROOM)

@@ -8,6 +8,7 @@ import numpy as np
 
 from percussion_model import Scene, Simulation
 from percussion_model.solvers.wave.records import Place, Steel
+from tests.engine_views import chain_of, first_section
 
 E, RHO, AREA = 210e9, 7850.0, 2e-3
 C0 = math.sqrt(E / RHO)
@@ -55,11 +56,11 @@ def sent_down(simulation, name, steps):
     """Mean force that was sent into a bar in each step so far, where none comes up in it."""
     after(simulation, steps)
     solver, state = simulation.solver, simulation._state
-    section = solver._sections[name].start
-    ring, size = solver._chain.places[section, [Place.RING, Place.SIZE]]
+    section = first_section(solver, name)
+    ring, size = chain_of(solver).places[section, [Place.RING, Place.SIZE]]
     assert size >= steps
     ages = (int(state.record[0]["step"]) - np.arange(steps)) & (size - 1)
-    sent = solver._chain.steel[section, Steel.IMPEDANCE] * state.arrays[-1][0, ring + ages]
+    sent = chain_of(solver).steel[section, Steel.IMPEDANCE] * state.arrays[-1][0, ring + ages]
     return sent[::-1]
 
 

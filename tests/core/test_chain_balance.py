@@ -19,6 +19,7 @@ from tests.core.chain_scenes import (
     rigid,
     struck,
 )
+from tests.engine_views import chain_of
 
 # --------------------------------------------------------------- momentum, static load
 
@@ -34,7 +35,7 @@ def test_momentum_of_all_bars_is_what_outer_forces_gave(loss):
                  "drive": "external"},
         drive={"external_force": 1500.0}, start={"piston_velocity": 9.0},
     )  # fmt: skip
-    bodies = simulation.solver._chain.bodies
+    bodies = chain_of(simulation.solver).bodies
     first = bodies[:, 0] @ simulation._state.arrays[0][Bar.VELOCITY]
     weight = bodies[:, 0].sum() * 10.0
     for steps in (50, 300, 2000):
@@ -99,7 +100,7 @@ def test_static_load_does_not_creep(joint):
         assert of_joint(simulation, Has.CLOSED) == 1.0
         assert of_joint(simulation, Has.GAP) == 0.0
     if joint == "lossy":  # its spring carries the load of the bar above
-        fit = simulation.solver._chain.fits[0]
+        fit = chain_of(simulation.solver).fits[0]
         short = (2500.0 + 10.0 * RHO * AREA * CELL * 80) / fit[3]
         assert of_joint(simulation, Has.GAP) == pytest.approx(short, rel=1e-2)
 
@@ -184,7 +185,7 @@ def test_recoil_is_the_opposite_of_the_drive():
     )  # fmt: skip
     after(simulation, 600)
     assert simulation.events["kind"].tolist().count(EventKind.DRIVE_UP) == 1
-    bodies, state = simulation.solver._chain.bodies, simulation._state
+    bodies, state = chain_of(simulation.solver).bodies, simulation._state
     moving = bodies[:, 0] @ state.arrays[0][Bar.VELOCITY]
     moving += 5.0 * state.record[0]["v_p"] + 150.0 * state.record[0]["v_c"]
     assert moving == pytest.approx(25.0, rel=1e-10)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from percussion_model import Mode, Scene, Section, Simulation
+from percussion_model.engine.solvers import WaveSolver
 from percussion_model.physics.records import BLOW, EVENT
 from percussion_model.solvers.wave.records import Place, Steel
-from percussion_model.solvers.wave.solver import WaveSolver
+from tests.engine_views import chain_of
 
 L = 0.20125
 ETA = Scene().loss.time
@@ -32,7 +33,7 @@ def free_bar(sections, cells, eta=ETA):
 def under_way(solver, step):
     """Both places in the rings of each wave that is under way; its energy at 1 m/s [J]."""
     first, second, worth = [], [], []
-    chain = solver._chain
+    chain = chain_of(solver)
     for place, steel in zip(chain.places, chain.steel, strict=True):
         ring, size, delay, taps, weight = (
             int(place[row])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from percussion_model.engine.solvers import RigidSolver
 from percussion_model.physics.ledger import complete_ledger, energies
 from percussion_model.physics.records import (
     BLOW,
@@ -21,7 +22,6 @@ from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.rigid.motion import fall_time, oscillate, oscillate_with_loss
 from percussion_model.solvers.rigid.restitution import restitution, st_venant_restitution
-from percussion_model.solvers.rigid.solver import RigidSolver
 from tests.state_bits import state_bits
 
 RIGID = {"piston": {"model": "rigid"}, "bit": {"model": "rigid"}}
@@ -266,7 +266,7 @@ def test_reading_does_not_touch_and_copies_repeat():
 def test_inputs_act_at_once_or_at_the_next_cycle():
     solver = make()
     state, _, _ = run(solver, 0.52)
-    solver.commit(state, 0.52, None, None, False)
+    solver.commit(state, 0.52, np.zeros(1, BLOW), np.zeros(1, EVENT), False)
     before = look(solver, state, [0.52])
     solver.set_inputs(state, feed_force=3500.0, drive_force=4000.0, loading_stiffness=1.5e9)
     after = look(solver, state, [0.52])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from percussion_model.engine.solvers import RigidSolver
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers.rigid.solver import RigidSolver
 
 FF, DFC, FC, BC, SS = Mode
 

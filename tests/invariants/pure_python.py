@@ -1,7 +1,6 @@
 """One blow computed by the kernels as plain Python, if wanted with a planted fault.
 
-Run with NUMBA_DISABLE_JIT=1; prints a line of JSON. Without the compiler a
-record must be `np.record` to have its fields as attributes.
+Run with NUMBA_DISABLE_JIT=1; prints a line of JSON.
 """
 
 from __future__ import annotations
@@ -9,8 +8,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-
-import numpy as np
 
 # One blow of a coarse reference drill, the leaps of modes off so that every step is made.
 SCENES = {
@@ -29,25 +26,6 @@ SCENES = {
 }
 DURATION = 0.0025
 FAULT = 0.999
-
-
-def use_attribute_records() -> None:
-    """Let the fields of records be attributes, as they are in compiled kernels."""
-    from percussion_model.physics import records
-    from percussion_model.scene import numbers
-    from percussion_model.solvers.fem import records as of_fem
-    from percussion_model.solvers.modal import records as of_modes
-    from percussion_model.solvers.wave import records as of_waves
-
-    for module, names in (
-        (records, ("BLOW", "EVENT", "READING")),
-        (numbers, ("SCENE_NUMBERS",)),
-        (of_waves, ("WAVE_PAR", "WAVE_STATE")),
-        (of_modes, ("MODAL_PAR", "MODAL_STATE")),
-        (of_fem, ("FEM_PAR", "FEM_STATE")),
-    ):
-        for name in names:
-            setattr(module, name, np.dtype((np.record, getattr(module, name))))
 
 
 def replace(name: str, function) -> None:
@@ -175,7 +153,6 @@ def main(solver: str, fault: str) -> None:
     """Plant a fault, run and print what came of it."""
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise SystemExit("set NUMBA_DISABLE_JIT=1")
-    use_attribute_records()
 
     FAULTS[fault][1]()
     simulation = run_scene(solver)

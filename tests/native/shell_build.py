@@ -16,10 +16,11 @@ from percussion_model.scene.values import SCENE_NUMBERS
 
 HERE = Path(__file__).parent
 SHELL = HERE.parents[1] / "fmu_src" / "native"
+ENGINE = HERE.parents[1] / "percussion_model" / "engine"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-FILES = ("fmi2", "fmi3", "fmi3_none", "fmi3_values", "hash", "instance", "kernels", "memory",
-         "place", "state", "tables", "text", "values")  # fmt: skip
+FILES = ("fmi2", "fmi3", "fmi3_none", "fmi3_values", "hash", "instance", "kernels", "place",
+         "shared", "state", "tables", "text", "values")  # fmt: skip
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror")
 SANITIZERS = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 # Words of the image and outputs that the toy uses, by the names of its macros.
@@ -61,8 +62,9 @@ def compile_c(out: Path, sources: Sequence[Path], flags: Sequence[str]) -> Path:
     """Compile and link."""
     assert COMPILER is not None
     subprocess.run(
-        [COMPILER, "-std=c11", "-O2", "-D_POSIX_C_SOURCE=200809L", *WARNINGS, f"-I{SHELL}",
-         f"-isystem{HEADERS}", *map(str, sources), *flags, "-o", str(out), "-lm"],
+        [COMPILER, "-std=c11", "-O2", "-D_POSIX_C_SOURCE=200809L", *WARNINGS,
+         f"-I{SHELL}", f"-I{ENGINE}", f"-isystem{HEADERS}", *map(str, sources),
+         *flags, "-o", str(out), "-lm"],
         check=True,
     )  # fmt: skip
     return out
@@ -76,7 +78,8 @@ def build_library(folder: Path, flags: Sequence[str] = ()) -> Path:
     macros |= {name: fields.index(field) for name, field in WORDS.items()}
     macros |= {name: outputs.index(output) for name, output in OUTPUTS.items()}
     defined = [f"-D{name}={value}" for name, value in macros.items()]
-    sources = [SHELL / f"{name}.c" for name in FILES] + [HERE / "fake_kernels.c"]
+    sources = [SHELL / f"{name}.c" for name in FILES]
+    sources += [ENGINE / "memory.c", HERE / "fake_kernels.c"]
     shared = ("-shared", "-fPIC", "-fvisibility=hidden")
     return compile_c(folder / "toy.so", sources, (*shared, *defined, *flags))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from pathlib import Path
@@ -14,9 +15,11 @@ from fmu_src.native import build as building
 from fmu_src.native import library as native
 from fmu_src.native.archive import write_native_fmu
 from fmu_src.native.build import native_files
-from fmu_src.native.library import MOST_KEPT, NoCompilerError, compiler_for, libraries
+from fmu_src.native.library import libraries
 from fmu_src.native.tables import model_tables
-from fmu_src.slave.native import this_platform
+from percussion_model.engine import compiler
+from percussion_model.engine.compiler import MOST_KEPT, NoCompilerError, compiler_for
+from percussion_model.engine.platforms import this_platform
 from percussion_model.scene.scene import Scene, SceneError
 from tests.commands import percussion
 
@@ -25,8 +28,8 @@ HOST = "x86_64-linux"
 
 @pytest.fixture
 def without_compilers(monkeypatch):
-    monkeypatch.setattr(native.shutil, "which", lambda name: None)
-    monkeypatch.setattr(native.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
 
 
 def bake(scene, path):
@@ -104,13 +107,13 @@ def linked(monkeypatch):
     """Names of platforms, in the order of linking, which takes a while and compiles nothing."""
     names = []
 
-    def link(name, compiler, work, out):
+    def link(name, compiler, sources, parts, out, flags):
         names.append(name)
         time.sleep(0.5)
         out.write_bytes(b"library")
 
     monkeypatch.setattr(native, "compiler_for", lambda name, word: ["cc"])
-    monkeypatch.setattr(native, "make_objects", lambda work, platforms: None)
+    monkeypatch.setattr(native, "objects", lambda _, names, report: {one: [] for one in names})
     monkeypatch.setattr(native, "link", link)
     return names
 
@@ -134,7 +137,7 @@ def test_the_newest_libraries_are_kept(linked, tmp_path, monkeypatch):
     for k, stamp in enumerate(stamps):
         monkeypatch.setattr(native, "stamp", lambda stamp=stamp: stamp)
         libraries([HOST], tmp_path)
-        native.os.utime(tmp_path / stamp, (k, k))
+        os.utime(tmp_path / stamp, (k, k))
     left = {path.name for path in tmp_path.glob("*/")}
     assert len(left) == MOST_KEPT
     assert stamps[-1] in left

@@ -25,6 +25,7 @@ from fmu_src.native.compare import STEP, STEPS, fmu_outputs, package_outputs
 from fmu_src.slave.native import library_name, this_platform
 from percussion_model import Scene
 from percussion_model.coupling import CouplingError
+from percussion_model.engine import compiler
 from scenarios.harness import Instance
 
 ROOT = Path(__file__).parents[2]
@@ -171,8 +172,8 @@ def test_damaged_tables_give_no_instance(write):
 def test_without_a_compiler_an_fmu_is_built_and_a_line_says_so(tmp_path, monkeypatch, capsys):
     compile_all = partial(native.libraries, kept=tmp_path / "kept")
     monkeypatch.setattr(native, "libraries", compile_all)
-    monkeypatch.setattr(native.shutil, "which", lambda name: None)
-    monkeypatch.setattr(native.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
     native.library_here.cache_clear()
     try:
         build_hammer(RIGID, tmp_path / "Hammer.fmu")

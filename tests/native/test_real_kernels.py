@@ -13,8 +13,10 @@ from typing import NamedTuple
 import pytest
 from fmpy import extract, read_model_description
 
-from fmu_src.native.library import FLAGS, HERE, PLATFORMS, libraries, make_objects, this_platform
+from fmu_src.native.library import ENGINE, HERE, MODULES, libraries
 from percussion_model import Scene
+from percussion_model.engine.compiler import FLAGS, objects
+from percussion_model.engine.platforms import PLATFORMS, this_platform
 from tests.native import shell_build as build
 from tests.native.test_native_fmu import SCENES, SOLVERS
 
@@ -129,13 +131,13 @@ def test_sequences_of_any_calls(host, unpack, name, count, monkeypatch):
 @long
 def test_sanitizers_see_nothing(unpack, tmp_path):
     """In the shell, with the real kernels."""
-    make_objects(tmp_path, [this_platform()])
+    parts = objects(MODULES, [this_platform()])[this_platform()]
     library = tmp_path / "checked.so"
-    defined = ("-DHAVE_AVX2_KERNELS",) if list(tmp_path.glob("*_avx2.o")) else ()
-    sources = [*map(str, sorted(HERE.glob("*.c"))), *map(str, tmp_path.glob("*.o"))]
+    defined = ("-DHAVE_AVX2_KERNELS",) if any("_avx2" in one.name for one in parts) else ()
+    sources = [*map(str, sorted(HERE.glob("*.c"))), str(ENGINE / "memory.c"), *map(str, parts)]
     subprocess.run(
         [build.COMPILER, *FLAGS, *build.SANITIZERS, *defined, "-fPIC", f"-I{HERE}",
-         f"-isystem{build.HEADERS}", *sources, "-lm", "-o", str(library)],
+         f"-I{ENGINE}", f"-isystem{build.HEADERS}", *sources, "-lm", "-o", str(library)],
         check=True,
     )  # fmt: skip
     (tmp_path / "host").mkdir()

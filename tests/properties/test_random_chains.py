@@ -18,6 +18,7 @@ from percussion_model.physics.records import EventKind
 from percussion_model.solvers.base import make_solver
 from percussion_model.solvers.wave.records import Bar, Body, Fit, Has, Joint, Place, Steel
 from percussion_model.solvers.wave.sections import kept_of
+from tests.engine_views import chain_of
 from tests.properties.source import Generator, Source, chance, decades
 from tests.state_bits import run_bits
 
@@ -198,7 +199,7 @@ def under_way(simulation: Simulation, k: int) -> tuple[np.ndarray, np.ndarray, i
     late : int
         First age of which a share may have arrived.
     """
-    chain, step = simulation.solver._chain, int(simulation._state.record[0]["step"])
+    chain, step = chain_of(simulation.solver), int(simulation._state.record[0]["step"])
     place, rings = chain.places[k], simulation._state.arrays[3][0]
     taps, delay, size = place[Place.TAPS], place[Place.DELAY], place[Place.SIZE]
     weights = chain.weights[0, place[Place.WEIGHTS] : place[Place.WEIGHTS] + taps][::-1]
@@ -215,9 +216,9 @@ def half_arrived(simulation: Simulation) -> float:
     by as much too little.
     """
     solver, total = simulation.solver, 0.0
-    for k in range(len(solver._chain.places)):
+    for k in range(len(chain_of(solver).places)):
         waves, left, late = under_way(simulation, k)
-        z = solver._chain.steel[k, Steel.IMPEDANCE]
+        z = chain_of(solver).steel[k, Steel.IMPEDANCE]
         share = np.maximum(left[late:], 0.0)
         total += z * solver.time_step * float((waves[:, late:] ** 2 @ share).sum())
     return total
@@ -230,7 +231,7 @@ def check_joints(simulation: Simulation) -> None:
     step = int(simulation._state.record[0]["step"])
     simulation.advance((step + 1) * solver.time_step)
     scale = max(1.0, np.abs(joints[Has.FORCE]).max(), np.abs(joints[Has.LEAST]).max())
-    for j, fit in enumerate(solver._chain.fits):
+    for j, fit in enumerate(chain_of(solver).fits):
         if fit[Fit.KIND] not in (Joint.CONTACT, Joint.THREADED):
             continue
         gap, closed, force = joints[Has.GAP, j], joints[Has.CLOSED, j], joints[Has.FORCE, j]
@@ -274,7 +275,9 @@ class Balance:
     def moving(self) -> float:
         """Momentum of bars, rigid piston and casing [N s]."""
         solver, s = self.simulation.solver, self.simulation._state.record[0]
-        total = solver._chain.bodies[:, Body.MASS] @ self.simulation._state.arrays[0][Bar.VELOCITY]
+        total = (
+            chain_of(solver).bodies[:, Body.MASS] @ self.simulation._state.arrays[0][Bar.VELOCITY]
+        )
         # loss adds to the force of waves what they give later
         par = solver._par[0]
         late = par["viscous"] * par["dt"]
@@ -290,7 +293,7 @@ class Balance:
         simulation = self.simulation
         scene, state = simulation.scene, simulation._state
         s, t = state.record[0], simulation.solver.time(state)
-        mass = simulation.solver._chain.bodies[:, Body.MASS].sum()
+        mass = chain_of(simulation.solver).bodies[:, Body.MASS].sum()
         if scene.piston.model == "rigid":
             mass += scene.piston.mass
         weight = mass * scene.gravity.acceleration if scene.effects.gravity else 0.0
@@ -311,9 +314,9 @@ class Balance:
 
 def kept_momentum(simulation: Simulation, k: int) -> float:
     """Momentum by Z dt of what a section of one to two steps keeps apart from its ring [m/s]."""
-    places, rings = simulation.solver._chain.places[k], simulation._state.arrays[-1][0]
+    places, rings = chain_of(simulation.solver).places[k], simulation._state.arrays[-1][0]
     first = int(places[Place.RING] + 4 * places[Place.SIZE])
-    return float(kept_of(simulation.solver._chain, k) * rings[first : first + 2].sum())
+    return float(kept_of(chain_of(simulation.solver), k) * rings[first : first + 2].sum())
 
 
 def check_waves(simulation: Simulation) -> None:
@@ -322,12 +325,12 @@ def check_waves(simulation: Simulation) -> None:
     on = (scene.effects.gravity, scene.effects.feed, scene.effects.damper)
     if any(on) or scene.effects.drive != "none":
         return
-    bodies, velocities = solver._chain.bodies, state.arrays[0][Bar.VELOCITY]
+    bodies, velocities = chain_of(solver).bodies, state.arrays[0][Bar.VELOCITY]
     for body, velocity in zip(bodies, velocities, strict=True):
         found = scale = 0.0
         for k in range(int(body[Body.FIRST]), int(body[Body.LAST]) + 1):
             waves, left, _ = under_way(simulation, k)
-            z = solver._chain.steel[k, Steel.IMPEDANCE] * solver.time_step
+            z = chain_of(solver).steel[k, Steel.IMPEDANCE] * solver.time_step
             found += z * float((waves @ left).sum()) + z * kept_momentum(simulation, k)
             scale += z * float(np.abs(waves).sum())
         off = abs(found - body[Body.MASS] * velocity)

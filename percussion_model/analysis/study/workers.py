@@ -13,8 +13,8 @@ from multiprocessing import active_children, current_process, get_context
 from threading import current_thread, main_thread
 from typing import Any
 
+from percussion_model.engine.orphans import end_with_parent
 from percussion_model.scene.inputs import SimulationError
-from percussion_model.simulation.orphans import end_with_parent
 
 # Exit code of a worker that came to start workers itself, since it ran the script again.
 STARTED_AGAIN = 97

@@ -212,24 +212,20 @@ def hint_at_unusual(scene: Scene) -> None:
         hint(key, text)
 
 
-# Solvers of whose compilation this process has told: many scenes may be read before it begins.
-_told: set[str] = set()
-
-
 def tell_of_compiling(*solvers: str) -> None:
-    """Say on stderr that kernels are going to be compiled, where numba does not keep them yet."""
-    from percussion_model.solvers.base import compiling_takes, place_of_kernels
+    """Compile the solvers that have to be, and say so on stderr."""
+    from percussion_model.engine.compiler import NoCompilerError
+    from percussion_model.engine.library import make, place_to_compile
+    from percussion_model.interface.progress import lines
 
-    places = {name: place_of_kernels(name) for name in solvers if name not in _told}
-    new = {name: place for name, place in places.items() if place is not None}
-    if new:
-        _told.update(new)
-        long = compiling_takes("modal" if "modal" in new else next(iter(new)))
-        long += " each" if len(new) > 1 else ""
-        print_message(
-            f"compiling the kernels of the solver {' and '.join(new)}: once, for about {long}; "
-            f"they are kept in {', '.join(map(str, new.values()))}"
-        )
+    places = {name: place_to_compile(name) for name in dict.fromkeys(solvers)}
+    for name, place in places.items():
+        if place is None:
+            continue
+        print_message(f"compiling the solver {name}: once, for about a minute; kept in {place}")
+        # without a linker it is loaded as it is, without a compiler refused where it is used
+        with lines("compiling") as report, suppress(NoCompilerError):
+            make(name, report)
 
 
 def check_outputs(folder: Path | None, json_file: str | None) -> None:

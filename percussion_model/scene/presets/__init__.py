@@ -27,11 +27,6 @@ def scenario_folder() -> Path:
     raise SceneError(f"{_BESIDE / _NAMES[0]}: there is no such folder; install percussion_model")
 
 
-def is_clone() -> bool:
-    """Whether this is a clone of the repository, and not an installed package."""
-    return scenario_folder().name == _NAMES[1]
-
-
 def scene_presets() -> dict[str, Path]:
     """Scenes that ship, by name."""
     folder = scenario_folder()

@@ -181,7 +181,7 @@ def start_periodic(drill: Drill, problem: Problem) -> None:
     simulation.restore(before)
     simulation.advance(float(last["time"] - AHEAD * last["period"]))
     state = simulation.solver.read(simulation.save().state, simulation.time, np.zeros(1, READING))
-    record, nodes = state.record[0], state.workspace.reshape(len(Node), -1)
+    record, nodes = state.record[0], state.arrays[0]
     drill.y[: drill.n], drill.y[drill.n : 2 * drill.n] = nodes[Node.U], nodes[Node.V]
     drill.y[: drill.n] += float(record["far"])
     drill.y[-2:] = float(record["w"]), 0.0

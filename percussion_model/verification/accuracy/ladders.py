@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from percussion_model.engine.solvers import ModalSolver
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.modal.resolution import most_modes
-from percussion_model.solvers.modal.solver import ModalSolver
 from percussion_model.solvers.setup import elastic_times, kelvin_voigt_time
 from percussion_model.verification.accuracy.exact_flow import ExactFlowSolver
 from percussion_model.verification.accuracy.explicit import COURANT as COURANT_OF_PEER

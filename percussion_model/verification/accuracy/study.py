@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import takewhile
 from typing import Any
 
+from percussion_model.engine.library import place_to_compile
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.simulation.uncertain import in_digits
-from percussion_model.solvers.base import place_of_kernels
 from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
     COMPARED,
@@ -407,7 +407,7 @@ def study(
     default = default_solver(scene)
     # make each solver once: compile, or load what was compiled before
     for name in solvers_of(names, scene):
-        word = "loading" if place_of_kernels(name) is None else "compiling"
+        word = "loading" if place_to_compile(name) is None else "compiling"
         progress(f"{word} the solver {name}", None)
         chosen = by_modes(scene, PILOT_MODES) if name == "modal" else scene.computed_by(name)
         compilation[name] = Simulation(chosen).setup_time

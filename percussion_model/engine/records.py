@@ -1,30 +1,22 @@
 """What the memory of a motion holds: a head, what moves, and what does not.
 
-The shell knows the first four words. What moves stands in one part, which is all of a saved
+Hosts know the first words of the head. What moves stands in one part, which is all of a saved
 state; copies of it are read, since to read a state means to carry it on.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
-from numba import carray
 
-from fmu_src.native.memory import (
-    ENTRY_WORDS,
-    LINE,
-    allocate,
-    lines,
-    records_at,
-    viewing,
-    word_pointer,
-)
-from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import BLOW, EVENT, READING
 from percussion_model.scene.inputs import INPUTS
 
+# Of a line of a processor's cache: parts of a memory begin at whole lines [bytes].
+LINE = 64
+# Words of a row of the directory: an offset [bytes], and up to four dimensions.
+ENTRY_WORDS = 5
 # Rows of blows that one call of a solver can fill.
 BLOW_ROOM = 64
 # What a solver is asked for.
@@ -90,6 +82,13 @@ HEAD = np.dtype(
         ("peak_contact_at", "i8"),
         ("locked_at", "i8"),  # -1: there is none
         ("storms_at", "i8"),
+        ("changed_at", "i8"),  # -1: the solver need not know that inputs have changed
+        ("blow_count_at", "i8"),  # words of the record with rows that a call has listed
+        ("event_count_at", "i8"),
+        ("moving_row", "i8"),  # of the directory: first of the arrays that move, how many
+        ("moving_rows", "i8"),
+        ("time_step", "f8"),  # 0: there is none [s]
+        ("wave_speed_error", "f8"),
         ("rock", "i8"),  # RockKind
         ("gauge_bar", "i8"),  # GaugeBar
         ("gauge_cell", "i8"),
@@ -131,12 +130,6 @@ MOTION = np.dtype(
     align=True,
 )
 
-head_records = records_at(HEAD)
-motion_records = records_at(MOTION)
-blow_records = records_at(BLOW)
-event_records = records_at(EVENT)
-reading_records = records_at(READING)
-
 MOTION_BYTES, BLOW_BYTES, READING_BYTES = MOTION.itemsize, BLOW.itemsize, READING.itemsize
 HEAD_BYTES, EVENT_BYTES = HEAD.itemsize, EVENT.itemsize
 # Place of the solver's record in what moves; its arrays follow at whole lines.
@@ -147,118 +140,3 @@ ENTRIES_AT = (HEAD_BYTES + LINE - 1) // LINE * LINE
 def work_at(dtype: np.dtype) -> int:
     """Place of a solver's first array in what moves, behind a record of a type."""
     return (RECORD + dtype.itemsize + LINE - 1) // LINE * LINE
-
-
-@viewing
-def motion_of(base):
-    """The MOTION record."""
-    return motion_records(base + head_records(base, 1)[0].state_at, 1)[0]
-
-
-@viewing
-def last_blow(base):
-    """The last whole blow: it moves too, behind the MOTION record."""
-    return blow_records(base + head_records(base, 1)[0].state_at + MOTION_BYTES, 1)
-
-
-def views_of(par: np.dtype, state: np.dtype) -> tuple[Any, Any]:
-    """Views of a solver's parameters and of its state, as arrays of one record.
-
-    The first takes the address of a motion, the second that of what moves or of a copy of it.
-    """
-    parameters_at, states_at = records_at(par), records_at(state)
-
-    @viewing
-    def parameters(base):
-        return parameters_at(base + head_records(base, 1)[0].par_at, 1)
-
-    @viewing
-    def state_in(moving):
-        return states_at(moving + RECORD, 1)
-
-    return parameters, state_in
-
-
-@viewing
-def directory(base):
-    """Where the arrays of a solver lie: rows as in `fmu_src.native.memory`."""
-    return carray(word_pointer(base + ENTRIES_AT), (ENTRIES, ENTRY_WORDS))
-
-
-@viewing
-def blow_rows(base, room):
-    """Room for so many blows."""
-    return blow_records(base + head_records(base, 1)[0].blows_at, room)
-
-
-@viewing
-def event_rows(base):
-    """Room for an event, which is never filled."""
-    return event_records(base + head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES, 1)
-
-
-@viewing
-def reading_of(base):
-    """What was read of the present state."""
-    at = head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES
-    return reading_records(base + at, 1)
-
-
-@viewing
-def other_reading(base):
-    """What is read beside it."""
-    at = head_records(base, 1)[0].blows_at + BLOW_ROOM * BLOW_BYTES + EVENT_BYTES
-    return reading_records(base + at + READING_BYTES, 1)
-
-
-@preparing
-def make_memory(kind, par_bytes, moving_bytes, room_bytes, tables_bytes):
-    """Memory of zeros for a motion, with its head.
-
-    Parameters
-    ----------
-    kind : int
-        `Kind`.
-    par_bytes : int
-        Of the solver's parameters.
-    moving_bytes : int
-        Of all that moves.
-    room_bytes : int
-        Of the room that a step works in.
-    tables_bytes : int
-        Of tables that never change: equal motions share them.
-
-    Returns
-    -------
-    base : int
-        Address; 0 where there is no memory left.
-    room_at, tables_at : int
-        Offsets of the room and of the tables.
-    """
-    par_at = ENTRIES_AT + lines(8 * ENTRIES * ENTRY_WORDS)
-    state_at = par_at + lines(par_bytes)
-    moving_bytes = lines(moving_bytes)
-    left_at = state_at + moving_bytes
-    blows_at = left_at + 3 * moving_bytes
-    room_at = blows_at + lines(BLOW_ROOM * BLOW_BYTES + EVENT_BYTES + 2 * READING_BYTES)
-    tables_at = room_at + room_bytes
-    total = tables_at + tables_bytes
-    base = allocate(total)
-    if base == 0:
-        return base, room_at, tables_at
-    head = head_records(base, 1)[0]
-    head.shared_at, head.directory_at = tables_at, ENTRIES_AT
-    head.directory_rows, head.directory_words = ENTRIES, ENTRY_WORDS
-    head.bytes, head.state_at, head.state_bytes, head.kind = total, state_at, moving_bytes, kind
-    head.par_at, head.blows_at, head.record_at = par_at, blows_at, RECORD
-    head.left_at, head.here_at = left_at, left_at + moving_bytes
-    head.trial_at = left_at + 2 * moving_bytes
-    return base, room_at, tables_at
-
-
-@preparing
-def set_gauge(base, bar, cell, above, impedance, area):
-    """Enter where stress is read, and what is there."""
-    head = head_records(base, 1)[0]
-    head.gauge_bar, head.gauge_cell, head.gauge_above = bar, cell, above
-    head.gauge_impedance, head.gauge_area = impedance, area

@@ -1,8 +1,8 @@
-"""Object code of the kernels, for the C shell to be linked with.
+"""Object code of entries: of one solver, or of another module that has some.
 
 Numba compiles the entries for a plain processor; LLVM then makes code for each target out of
 that. All but the entries becomes internal, so that what only Python calls falls away, and what
-is left undefined must be on a short list.
+is left undefined must be on a short list, or be an entry of a solver.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import ctypes
 import gc
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest.mock import patch
@@ -23,19 +24,11 @@ from numba.core.caching import FunctionCache
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.cpu import CPUContext
 
-from fmu_src.native import entries
-from fmu_src.native.library import PLATFORMS
-from percussion_model.simulation.orphans import end_with_parent
+from percussion_model.engine.entries import ENTRIES, SOLVERS
+from percussion_model.engine.orphans import end_with_parent
+from percussion_model.engine.platforms import PLATFORMS
 
-_WORD, _NUMBER = types.int64, types.float64
-# Entries by their names in C, with the types of their arguments: pointers are addresses.
-ENTRIES: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "kernel_check": (entries.check, (_WORD,) * 2),
-    "kernel_create": (entries.create, (_WORD,) * 3),
-    "kernel_step": (entries.take_step, (*(_WORD,) * 3, _NUMBER, _NUMBER, _WORD, _WORD)),
-    "kernel_read": (entries.read_outputs, (_WORD,) * 3),
-    "kernel_fault": (entries.find_fault, (_WORD, _WORD, _NUMBER, _WORD)),
-}
+_KINDS = {"w": types.int64, "n": types.float64}
 # What an entry returns where memory ends: Fault.MEMORY.
 NO_MEMORY = 1
 # What the shell and the C library give.
@@ -72,25 +65,63 @@ class Target(NamedTuple):
 AVX2 = "+avx2,+bmi,+bmi2,-fma"
 
 
+class Exported(NamedTuple):
+    """An entry by its name in C.
+
+    Attributes
+    ----------
+    function : kernel
+    result : type of numba
+    arguments : tuple of types
+        Addresses are whole numbers.
+    """
+
+    function: Any
+    result: Any
+    arguments: tuple[Any, ...]
+
+
+def exported_by(module: str) -> dict[str, Exported]:
+    """Entries of a module: those of a solver, or of what it calls EXPORTED (C name: form)."""
+    found = import_module(module)
+    solver = module.rpartition(".")[2]
+    forms: dict[str, tuple[str, str]] = getattr(found, "EXPORTED", {})
+    if not forms:
+        forms = {f"{solver}_{name}": (name, form) for name, form in ENTRIES.items()}
+    entries = {}
+    for name, (function, form) in forms.items():
+        result, _, arguments = form.partition(":")
+        kinds = tuple(_KINDS[one] for one in arguments)
+        entries[name] = Exported(getattr(found, function), _KINDS[result], kinds)
+    return entries
+
+
+def is_solvers(name: str) -> bool:
+    """Whether a name in C is that of an entry of a solver."""
+    solver, _, entry = name.partition("_")
+    return solver in SOLVERS and entry in ENTRIES
+
+
 def _ir_type(kind: Any) -> str:
     return "double" if kind == types.float64 else "i64"
 
 
-def _wrapper(name: str, called: str, arguments: tuple[Any, ...]) -> str:
+def _wrapper(name: str, called: str, one: Exported) -> str:
     """Function in LLVM's language that calls one of numba's, with a plain result."""
-    given = ", ".join(f"{_ir_type(kind)} %a{k}" for k, kind in enumerate(arguments))
+    given = ", ".join(f"{_ir_type(kind)} %a{k}" for k, kind in enumerate(one.arguments))
+    kind, end = _ir_type(one.result), NO_MEMORY if one.result == types.int64 else "0.0"
     return f"""
-define i64 @{name}({given}) {{
-  %result = alloca i64
+define {kind} @{name}({given}) {{
+  %result = alloca {kind}
   %error = alloca ptr
   store ptr null, ptr %error
   %status = call i32 @"{called}"(ptr %result, ptr %error, {given})
   %good = icmp eq i32 %status, 0
-  %value = load i64, ptr %result
-  %found = select i1 %good, i64 %value, i64 {NO_MEMORY}
-  ret i64 %found
+  %value = load {kind}, ptr %result
+  %found = select i1 %good, {kind} %value, {kind} {end}
+  ret {kind} %found
 }}
-declare i32 @"{called}"(ptr, ptr, {", ".join(map(_ir_type, arguments))})
+declare i32 @"{called}"(ptr, ptr, {", ".join(map(_ir_type, one.arguments))})
 """
 
 
@@ -129,17 +160,19 @@ def _add_callees_first(library: Any, found: dict[int, Any]) -> None:
     found[id(library)] = library
 
 
-def compile_entries() -> str:
-    """Compile all entries; LLVM's text of one module with all that they call."""
-    # numba wants to know where it is, though nothing calls it here
-    llvm.add_symbol("native_allocate", ctypes.cast(ctypes.CDLL(None).malloc, ctypes.c_void_p).value)
+def compile_entries(entries: Mapping[str, Exported]) -> str:
+    """Compile entries; LLVM's text of one module with all that they call."""
+    # numba wants to know where they are, though nothing calls them here
+    somewhere = ctypes.cast(ctypes.CDLL(None).malloc, ctypes.c_void_p).value
+    for name in ("native_allocate", *(f"{a}_{b}" for a in SOLVERS for b in ENTRIES)):
+        llvm.add_symbol(name, somewhere)
     wrappers, libraries = [], dict[int, Any]()
     with _each_by_itself():
-        for name, (function, arguments) in ENTRIES.items():
-            fresh = njit(error_model="numpy")(function.py_func)
-            fresh.compile(arguments)
-            compiled = fresh.overloads[arguments]
-            wrappers.append(_wrapper(name, compiled.fndesc.llvm_func_name, arguments))
+        for name, one in entries.items():
+            # a result of True or False is a whole number to C
+            fresh = njit(one.result(*one.arguments), error_model="numpy")(one.function.py_func)
+            (compiled,) = fresh.overloads.values()
+            wrappers.append(_wrapper(name, compiled.fndesc.llvm_func_name, one))
             _add_callees_first(compiled.library, libraries)
         whole = llvm.parse_assembly("")
         for text in wrappers:
@@ -229,6 +262,11 @@ def _without_words(text: str) -> str:
     )
 
 
+def plain_name(name: str) -> str:
+    """Name of an entry without what it has for a processor."""
+    return name.removesuffix("_base").removesuffix("_avx2")
+
+
 def undefined(module: Any) -> set[str]:
     """Functions that a module calls and does not have, LLVM's own left out."""
     return {
@@ -238,7 +276,7 @@ def undefined(module: Any) -> set[str]:
     }
 
 
-def make_object(text: str, target: Target, names: Iterable[str] = tuple(ENTRIES)) -> bytes:
+def make_object(text: str, target: Target, names: Iterable[str]) -> bytes:
     """Object code of the module for a target.
 
     Parameters
@@ -262,18 +300,19 @@ def make_object(text: str, target: Target, names: Iterable[str] = tuple(ENTRIES)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
     kept = set(names)
     for one in module.functions:
-        if not one.is_declaration:
-            if one.name in kept:
-                one.name += target.suffix
-            else:
-                one.linkage = "internal"
+        if one.name in kept or (one.is_declaration and is_solvers(one.name)):
+            one.name += target.suffix
+            one.visibility = "hidden" if one.is_declaration else "default"
+        elif not one.is_declaration:
+            one.linkage = "internal"
     for one in module.global_variables:
         if not one.is_declaration:
             one.linkage = "private"  # names of some follow from where files of this machine lie
     options = llvm.create_pipeline_tuning_options(3)
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    if missing := undefined(module) - ALLOWED:
+    missing = {one for one in undefined(module) - ALLOWED if not is_solvers(plain_name(one))}
+    if missing:
         raise ValueError(f"left undefined for {target.triple}: {', '.join(sorted(missing))}")
     if baked := re.search(r"inttoptr \(i64 [0-9]{6,}", str(module)):
         raise ValueError(f"an address of this process is in the code: {baked.group()}")
@@ -288,15 +327,16 @@ BUILDS = {
 }
 
 
-def main(folder: str, *platforms: str) -> None:
-    """Write the objects for platforms, `<platform>_<build>.o`, into a folder."""
+def main(module: str, folder: str, *platforms: str) -> None:
+    """Write the objects of a module's entries, `<platform>_<build>.o`, into a folder."""
     gc.disable()  # it would take a tenth of the time, and find nothing
-    text = compile_entries()
+    entries = exported_by(module)
+    text = compile_entries(entries)
     for platform in platforms:
         for cpu, features, suffix in BUILDS[platform.partition("-")[0]]:
             target = Target(PLATFORMS[platform].triple, cpu, features, suffix)
             file = Path(folder) / f"{platform}{suffix}.o"
-            file.write_bytes(make_object(text, target))
+            file.write_bytes(make_object(text, target, entries))
 
 
 if __name__ == "__main__":

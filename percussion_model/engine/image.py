@@ -1,57 +1,26 @@
-"""The image of a scene: all its numbers as words, which hosts change by their variables.
-
-Words: how many sections the piston has, the bit, how many rods there are, sections of each;
-the fields of `SCENE_NUMBERS`; sections of piston, bit and rods, four numbers each; joints of
-the rods, six numbers each; what only an FMU has (`Own`).
-"""
+"""Views of the image of a scene (`percussion_model.engine.scene_image`)."""
 
 from __future__ import annotations
 
-from enum import IntEnum
-
-from fmu_src.native.layout import GaugeBar
-from fmu_src.native.memory import (
+from percussion_model.engine.memory import (
     floats_at,
     matrix_at,
     merging,
+    new_record,
     records_at,
     viewing,
     words_at,
 )
+from percussion_model.engine.records import GaugeBar
+from percussion_model.engine.scene_image import COUNTS, JOINT, OWN, SECTION, VALUES, Own
 from percussion_model.physics.kernel import preparing
 from percussion_model.scene.numbers import JOINT_KINDS, Numbers
-from percussion_model.scene.parameters import find_row
-from percussion_model.scene.rows import ParameterRow
 from percussion_model.scene.values import SCENE_NUMBERS
-from percussion_model.solvers.state import words_of
 
-COUNTS = 3  # words before the sections of each rod
-VALUES = SCENE_NUMBERS.itemsize // 8
-SECTION, JOINT = 4, 6
 PERFECT = float(JOINT_KINDS.index("perfect"))
-AT = words_of(SCENE_NUMBERS)
 _values_at = records_at(SCENE_NUMBERS)
-
-
-def row_of(key: str) -> ParameterRow:
-    """Row of the parameter table."""
-    row = find_row(key)
-    assert row is not None, key
-    return row
-
-
-class Own(IntEnum):
-    """Numbers at the end of an image that no scene has."""
-
-    PRESSURE = 0
-    ON = 1
-    AREA = 2
-    GAUGE_BAR = 3
-    GAUGE_PLACE = 4
-    BARRIER_GIVEN = 5  # 1: it was asked for, not left to its default
-
-
-OWN = len(Own)
+# Room for the parameters of an image.
+new_values = new_record(SCENE_NUMBERS)
 
 
 @viewing
@@ -126,3 +95,10 @@ def gauge_sections(numbers, bar):
         first = numbers.rod_counts[:which].sum()
         return numbers.rod_sections[first : first + numbers.rod_counts[which]]
     return numbers.piston
+
+
+@merging
+def numbers_in(image, values):
+    """Numbers of an image; `values` is filled in, and must be held as long as they are used."""
+    fill_values(image, values)
+    return numbers_at(image, values)

@@ -1,56 +1,11 @@
-/* Memory that kernels ask for: motions, and arrays that live while one is made.
- *
- * Equal motions share their tables: the first one that is made stays as it is, and each instance
+/* Tables that equal motions share: the first one that is made stays as it is, and each instance
  * has a copy of all but the tables.
- *
- * Numba's code counts who holds an array in a record before its numbers (fmu_src/native/objects.py),
- * and calls the functions below by these names.
  */
 #include "shell.h"
 
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { LINE = 64 }; /* of a processor's cache [bytes] */
-
-/* As numba's code sees it: it reads the count and where the numbers are. */
-typedef struct {
-    size_t count;
-    void (*destroy)(void *data, size_t size, void *info);
-    void *info;
-    void *data;
-    size_t size;
-    void *allocator;
-} Array;
-
-int64_t native_allocate(int64_t size);
-void *NRT_Allocate(size_t size);
-void NRT_Free(void *data);
-Array *NRT_MemInfo_alloc(size_t size);
-Array *NRT_MemInfo_alloc_aligned(size_t size, unsigned align);
-Array *NRT_MemInfo_alloc_safe_aligned(size_t size, unsigned align);
-void NRT_MemInfo_call_dtor(Array *array);
-
-/* Where a memory really begins stands in the word before it. */
-int64_t native_allocate(int64_t size) {
-    if (size < 0 || (uint64_t)size > SIZE_MAX / 2) {
-        return 0;
-    }
-    char *whole = calloc(1, (size_t)size + LINE + sizeof whole);
-    if (whole == NULL) {
-        return 0;
-    }
-    uintptr_t begin = (uintptr_t)(whole + sizeof whole + LINE - 1) / LINE * LINE;
-    memcpy((char *)begin - sizeof whole, &whole, sizeof whole);
-    return (int64_t)begin;
-}
-
-static void free_memory(int64_t *motion) {
-    char *whole;
-    memcpy(&whole, (char *)motion - sizeof whole, sizeof whole);
-    free(whole);
-}
 
 /* A motion as it was made, whose tables others use. */
 typedef struct Shared Shared;
@@ -94,7 +49,7 @@ static void leave_shared(Shared *one) {
     }
     end_alone();
     if (is_last) {
-        free_memory(one->made);
+        native_free((int64_t)(intptr_t)one->made);
         free(one);
     }
 }
@@ -142,7 +97,7 @@ int64_t *share_motion(int64_t *made, const uint8_t digest[DIGEST]) {
     }
     end_alone();
     if (shared != mine) {
-        free_memory(made);
+        native_free((int64_t)(intptr_t)made);
         free(mine);
     }
     return copy_motion(shared);
@@ -151,40 +106,9 @@ int64_t *share_motion(int64_t *made, const uint8_t digest[DIGEST]) {
 void free_motion(int64_t *motion) {
     if (motion != NULL) {
         Shared *shared = (Shared *)(intptr_t)motion[SHARED];
-        free_memory(motion);
+        native_free((int64_t)(intptr_t)motion);
         if (shared != NULL) {
             leave_shared(shared);
         }
     }
 }
-
-Array *NRT_MemInfo_alloc_aligned(size_t size, unsigned align) {
-    if (size > SIZE_MAX / 2) {
-        return NULL;
-    }
-    size_t step = align > sizeof(void *) ? align : sizeof(void *);
-    Array *array = malloc(sizeof *array + size + step);
-    if (array == NULL) {
-        return NULL;
-    }
-    uintptr_t begin = ((uintptr_t)(array + 1) + step - 1) / step * step;
-    *array = (Array){.count = 1, .data = (void *)begin, .size = size};
-    return array;
-}
-
-Array *NRT_MemInfo_alloc_safe_aligned(size_t size, unsigned align) {
-    return NRT_MemInfo_alloc_aligned(size, align);
-}
-
-Array *NRT_MemInfo_alloc(size_t size) { return NRT_MemInfo_alloc_aligned(size, LINE); }
-
-void NRT_MemInfo_call_dtor(Array *array) {
-    if (array->destroy != NULL) {
-        array->destroy(array->data, array->size, array->info);
-    }
-    free(array);
-}
-
-void *NRT_Allocate(size_t size) { return malloc(size); }
-
-void NRT_Free(void *data) { free(data); }

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_src.native.layout import RECORD, directory
-from fmu_src.native.memory import floats_at, words_at
+from percussion_model.engine.layout import directory
+from percussion_model.engine.memory import floats_at, words_at
+from percussion_model.engine.records import RECORD
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.state import first_beyond, is_bounded
 

@@ -1,0 +1,143 @@
+"""The entries of a solver as functions: of a library, of objects, or of the sources.
+
+Libraries are found beside this module where an installation brings them, else they are made once
+and kept (`percussion_model.engine.compiler`). Without a linker the objects are loaded as they are.
+With NUMBA_DISABLE_JIT the sources run as they stand.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from percussion_model.engine import compiler
+from percussion_model.engine.entries import ENTRIES, SOLVERS
+from percussion_model.engine.platforms import PLATFORMS, this_platform
+from percussion_model.physics.kernel import DISABLED
+
+# What an installation brings.
+BROUGHT = compiler.HERE / "libraries"
+# Folders of sources that libraries follow from; a name in hidden files is none.
+FOLDERS = ("components", "engine", "physics", "scene", "solvers")
+_KINDS: dict[str, Any] = {"w": ctypes.c_int64, "n": ctypes.c_double}
+
+
+def module_of(solver: str) -> str:
+    """Name of the module with the entries of a solver."""
+    return f"{compiler.NAME}.engine.{solver}"
+
+
+@functools.cache
+def stamp() -> str:
+    """Hash of the sources of all solvers."""
+    files = (file for name in FOLDERS for file in (compiler.PACKAGE / name).rglob("*.py"))
+    return compiler.hash_of([*sorted(files), compiler.HERE / "memory.c"])
+
+
+def _library_file(solver: str) -> Path:
+    """File of the library of a solver, which need not be there."""
+    name = f"{solver}-{stamp()}{PLATFORMS[this_platform()].suffix}"
+    places = [BROUGHT, *(folder / "libraries" for folder in compiler.kept_folders())]
+    found = next((one / name for one in places if (one / name).is_file()), None)
+    return found or compiler.kept_folder() / "libraries" / name
+
+
+def place_to_compile(solver: str) -> Path | None:
+    """Folder in which a solver will be kept when it is compiled; None where nothing has to be."""
+    if solver not in SOLVERS or DISABLED or _library_file(solver).is_file():
+        return None
+    lacking = compiler.missing([module_of(solver)], [this_platform()])
+    return compiler.kept_folder() if lacking else None
+
+
+@functools.cache
+def entries_of(solver: str) -> Any:
+    """Entries of a solver by their names, with `free`, which takes what `create` gives.
+
+    Raises
+    ------
+    SceneError
+        If they have to be compiled, and cannot be.
+    """
+    if DISABLED:
+        return _plain(solver)
+    file = _library_file(solver)
+    if not file.is_file():
+        try:
+            make(solver)
+        except compiler.NoCompilerError:
+            if not compiler.can_compile():
+                raise
+            return _of_objects(solver)
+    return _of_library(solver, file)
+
+
+def make(solver: str, report: compiler.Report | None = None) -> None:
+    """Make the library of a solver, unless it is there.
+
+    Raises
+    ------
+    NoCompilerError
+        If nothing here compiles, or links.
+    """
+    file = _library_file(solver)
+    if file.is_file():
+        return
+    name = this_platform()
+    parts = compiler.objects([module_of(solver)], [name], report)[name]
+    command = compiler.compiler_for(name)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with compiler.only_one(file.parent / "link.lock"):
+        if not file.is_file():
+            source, flags = compiler.HERE / "memory.c", ["-DENGINE_LIBRARY"]
+            compiler.link(name, command, [source], parts, file, flags)
+            compiler.remove_old(file.parent, f"{solver}-*{file.suffix}")
+
+
+def _functions(solver: str, suffix: str, address_of: Callable[[str], int]) -> SimpleNamespace:
+    """Entries at addresses, which keep the interpreter's lock: a motion has room for one call."""
+    found = SimpleNamespace()
+    for name, form in ENTRIES.items():
+        result, _, arguments = form.partition(":")
+        kind = ctypes.PYFUNCTYPE(_KINDS[result], *(_KINDS[one] for one in arguments))
+        setattr(found, name, kind(address_of(f"{solver}_{name}{suffix}")))
+    return found
+
+
+def _of_library(solver: str, file: Path) -> SimpleNamespace:
+    library = ctypes.PyDLL(str(file))
+    library.engine_has_avx2.restype = ctypes.c_int64
+    suffix = "_avx2" if library.engine_has_avx2() else "_base"
+
+    def address_of(name: str) -> int:
+        return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0
+
+    found = _functions(solver, suffix, address_of)
+    library.native_free.argtypes, library.native_free.restype = (ctypes.c_int64,), None
+    found.free = library.native_free
+    return found
+
+
+def _of_objects(solver: str) -> SimpleNamespace:
+    from percussion_model.engine.loading import load_objects
+
+    name = this_platform()
+    files = compiler.objects([module_of(solver)], [name])[name]
+    address_of, suffix, free = load_objects(files)
+    found = _functions(solver, suffix, address_of)
+    found.free = free
+    return found
+
+
+def _plain(solver: str) -> SimpleNamespace:
+    from percussion_model.engine import plain_memory
+
+    module = import_module(module_of(solver))
+    found = SimpleNamespace(**{name: getattr(module, name) for name in ENTRIES})
+    found.free = plain_memory.free
+    return found

@@ -1,0 +1,63 @@
+"""The image of a scene: all its numbers as words, which hosts change by their variables.
+
+Words: how many sections the piston has, the bit, how many rods there are, sections of each;
+the fields of `SCENE_NUMBERS`; sections of piston, bit and rods, four numbers each; joints of
+the rods, six numbers each; what only an FMU has (`Own`).
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.parameters import find_row
+from percussion_model.scene.rows import ParameterRow
+from percussion_model.scene.values import SCENE_NUMBERS
+from percussion_model.solvers.state import words_of
+
+COUNTS = 3  # words before the sections of each rod
+VALUES = SCENE_NUMBERS.itemsize // 8
+SECTION, JOINT = 4, 6
+AT = words_of(SCENE_NUMBERS)
+
+
+def row_of(key: str) -> ParameterRow:
+    """Row of the parameter table."""
+    row = find_row(key)
+    assert row is not None, key
+    return row
+
+
+class Own(IntEnum):
+    """Numbers at the end of an image that no scene has."""
+
+    PRESSURE = 0
+    ON = 1
+    AREA = 2
+    GAUGE_BAR = 3
+    GAUGE_PLACE = 4
+    BARRIER_GIVEN = 5  # 1: it was asked for, not left to its default
+
+
+OWN = len(Own)
+
+
+def image_of(numbers: Numbers) -> np.ndarray:
+    """Image of a scene's numbers, whose drive pushes as they say.
+
+    Returns
+    -------
+    int64 array
+        Words, some of which are numbers.
+    """
+    counts = [len(numbers.piston), len(numbers.bit), len(numbers.rod_counts), *numbers.rod_counts]
+    values = np.array([numbers.values], SCENE_NUMBERS)
+    own = np.zeros(OWN)
+    own[Own.PRESSURE], own[Own.AREA] = values[0]["drive_force"], 1.0
+    own[Own.ON], own[Own.GAUGE_PLACE] = 1.0, -1.0
+    rows = (numbers.piston, numbers.bit, numbers.rod_sections, numbers.joints, own)
+    parts = [np.array(counts, np.int64), values.view(np.int64)]
+    parts += [np.ascontiguousarray(one, np.float64).view(np.int64).ravel() for one in rows]
+    return np.concatenate(parts)

@@ -1,0 +1,367 @@
+"""A solver by its compiled entries."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import weakref
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from percussion_model.engine.fault_texts import fault_text
+from percussion_model.engine.faults import Fault
+from percussion_model.engine.library import entries_of
+from percussion_model.engine.records import (
+    ADVANCE,
+    COMMIT,
+    ENTRIES,
+    ENTRIES_AT,
+    ENTRY_WORDS,
+    HEAD,
+    RECORD,
+    GaugeBar,
+)
+from percussion_model.engine.scene_image import image_of
+from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
+from percussion_model.scene.bar_groups import Bar
+from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.numbers import numbers_of
+from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.solvers.base import MOST_AHEAD, Solver
+from percussion_model.solvers.state import State, words_of
+
+# So many motions are kept as those whose tables others use.
+MOST_KEPT = 4
+# Numbers that tables follow from besides the bars, at most; and facts of a fault.
+KEY_NUMBERS, FACTS = 8, 4
+
+
+class Grid(NamedTuple):
+    """Cells of one bar, in which its fields are read.
+
+    Attributes
+    ----------
+    mass : ndarray
+        Of each, top to bottom [kg].
+    in_sections : list of int
+        Cells of each section.
+    """
+
+    mass: np.ndarray
+    in_sections: list[int]
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
+        return len(self.mass)
+
+
+class Motion:
+    """Memory that `create` of the entries has made; given back with this object.
+
+    Parameters
+    ----------
+    entries : namespace
+        Of a solver.
+    image : int64 array
+        Of a scene.
+    like : Motion, optional
+        Whose tables it uses.
+    """
+
+    def __init__(self, entries: Any, image: np.ndarray, like: Motion | None = None) -> None:
+        given = 0 if like is None else like.base
+        self.base: int = entries.create(image.ctypes.data, int(GaugeBar.NONE), 0.0, given)
+        if self.base == 0:
+            raise MemoryError("no memory is left for the tables of a scene")
+        self._like = like  # lives as long as this
+        weakref.finalize(self, entries.free, self.base)
+        self.head = self._at(0, HEAD, 1)[0]
+
+    def _at(self, offset: int, dtype: Any, count: int) -> np.ndarray:
+        size = count * np.dtype(dtype).itemsize
+        memory = (ctypes.c_char * size).from_address(self.base + int(offset))
+        return np.ndarray(count, dtype, memory)
+
+    def parameters(self, dtype: np.dtype) -> np.ndarray:
+        """Parameters of the solver, as an array of one record."""
+        return self._at(self.head["par_at"], dtype, 1)
+
+    @property
+    def table_bytes(self) -> int:
+        """Bytes of its tables, or of those that it uses."""
+        if self._like is not None:
+            return self._like.table_bytes
+        return int(self.head["bytes"] - self.head["shared_at"])
+
+    @property
+    def directory(self) -> np.ndarray:
+        """Offset and dimensions of each array."""
+        rows = self._at(ENTRIES_AT, np.int64, ENTRIES * ENTRY_WORDS)
+        return rows.reshape(ENTRIES, ENTRY_WORDS)
+
+    def array(self, row: int, dimensions: int, dtype: Any = np.float64) -> np.ndarray:
+        """An array of the directory that does not move."""
+        offset, *shape = self.directory[row, : 1 + dimensions].tolist()
+        return self._at(offset, dtype, math.prod(shape)).reshape(shape)
+
+    def shapes(self) -> tuple[tuple[int, int], ...]:
+        """Of the arrays that move, in their order."""
+        first, count = int(self.head["moving_row"]), int(self.head["moving_rows"])
+        rows = self.directory[first : first + count, 1:3].tolist()
+        return tuple(map(tuple, rows))
+
+    def moving(self) -> bytes:
+        """What moves, at time zero."""
+        size = int(self.head["state_bytes"])
+        return self._at(self.head["state_at"], np.uint8, size).tobytes()
+
+
+# Motions that were made last, by the solver and what tables follow from.
+_kept: dict[tuple[Any, ...], Motion] = {}
+
+
+def _bar_number(name: str) -> int:
+    """`GaugeBar` of a bar by its name."""
+    if name.startswith("rod "):
+        return int(GaugeBar.ROD) + int(name.removeprefix("rod ")) - 1
+    return int({"piston": GaugeBar.PISTON, "bit": GaugeBar.BIT}[name])
+
+
+class EngineSolver(Solver):
+    """A solver by its entries; subclasses name it.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Attributes
+    ----------
+    time_step : float or None
+        Longest step [s].
+    cells : dict of int
+        Modes, cells or elements of each elastic bar, by its name.
+    PAR, STATE : dtype
+        Of its parameters, and of its state's record.
+    """
+
+    PAR: ClassVar[np.dtype]
+    STATE: ClassVar[np.dtype]
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self._entries = entries_of(self.name)
+        numbers = numbers_of(scene)
+        self._image = image_of(numbers)
+        facts = np.zeros(FACTS)
+        fault = self._entries.refuse(self._image.ctypes.data, facts.ctypes.data)
+        if fault:
+            raise SceneError(fault_text(fault, facts))
+        self._motion = self._make_motion(numbers)
+        self._start, self._array_shapes = self._motion.moving(), self._motion.shapes()
+        self._base = int(self._motion.base)
+        self._par = self._motion.parameters(self.PAR)
+        head = self._motion.head
+        self.time_step = float(head["time_step"]) or None
+        self.wave_speed_error = float(head["wave_speed_error"])
+        self.operator_bytes = self._motion.table_bytes
+        words = words_of(self.STATE)
+        self._blow_word, self._event_word = words["n_blows"], words["n_events"]
+        self._names = self._elastic_bars()
+        self._grids: dict[str, Grid] = {}
+        self._shapes: dict[tuple[str, int], np.ndarray] = {}
+        self.cells = self._count_cells()
+        self._facts = facts
+
+    def _make_motion(self, numbers: Any) -> Motion:
+        """Motion with tables of its own, or with those of one that was made before."""
+        key_numbers = np.zeros(KEY_NUMBERS)
+        count = self._entries.table_key(self._image.ctypes.data, key_numbers.ctypes.data)
+        if count == 0:
+            return Motion(self._entries, self._image)
+        bars = numbers.piston.tobytes(), numbers.bit.tobytes(), numbers.values.piston_model
+        key = (self.name, *bars, key_numbers.tobytes())
+        if key not in _kept:
+            made = Motion(self._entries, self._image)
+            while len(_kept) >= MOST_KEPT:
+                del _kept[next(iter(_kept))]
+            _kept[key] = made
+        return Motion(self._entries, self._image, _kept[key])
+
+    def _elastic_bars(self) -> list[str]:
+        """Names of the bars that have cells."""
+        piston = ["piston"] * (self.scene.piston.model == "elastic")
+        return [*piston, "bit"]
+
+    def _count_cells(self) -> dict[str, int]:
+        return {name: self._grid(name).n for name in self._names}
+
+    def _grid(self, name: str) -> Grid:
+        if name not in self._grids:
+            bar = _bar_number(name)
+            sections = np.zeros(len(self.scene.bars[name].sections), np.int64)
+            image = self._image.ctypes.data
+            mass = np.zeros(self._entries.cells(image, bar, sections.ctypes.data, 0))
+            self._entries.cells(image, bar, 0, mass.ctypes.data)
+            self._grids[name] = Grid(mass, sections.tolist())
+        return self._grids[name]
+
+    # states
+
+    def new_state(self) -> State:
+        """State at time zero."""
+        return State(self.STATE, self._array_shapes, RECORD, self._start)
+
+    def time(self, state: State) -> float:
+        """Time up to which the state is committed [s]."""
+        found: float = self._entries.state_time(self._base, state.address)
+        return found
+
+    def grid_point_after(self, state: State, t: float) -> float:
+        """First time at or after `t` at which inputs can change [s]."""
+        found: float = self._entries.grid_point_after(self._base, state.address, t)
+        return found
+
+    def readable_until(self, state: State) -> float:
+        """Time up to which `read` answers without advancing the state far [s]."""
+        found: float = self._entries.readable_until(self._base, state.address)
+        return found
+
+    def time_of_blow(self, state: State) -> float:
+        """As in `Solver`."""
+        found: float = self._entries.time_of_blow(self._base, state.address)
+        return found
+
+    def state_fault(self, state: State, t: float) -> str:
+        """What is wrong with a state that comes from outside, of time `t` [s]; empty: nothing."""
+        facts = self._facts
+        fault = self._entries.find_fault(self._base, state.address, t, facts.ctypes.data)
+        of_numbers = (Fault.MODAL_FIELD, Fault.WAVE_FIELD, Fault.FEM_FIELD, Fault.RIGID_FIELD)
+        is_bounded = fault not in (*of_numbers, Fault.WORKSPACE)
+        if is_bounded and not self.time(state) <= t + MOST_AHEAD:
+            return f"its time of {self.time(state)!r} s, far after {t!r} s"
+        return fault_text(fault, facts).removeprefix("the saved state has ") if fault else ""
+
+    # motion
+
+    def _run(
+        self, task: int, state: State, t: float, blows: np.ndarray, events: np.ndarray,
+        record_events: bool,
+    ) -> tuple[int, int, int]:  # fmt: skip
+        status = self._entries.run(
+            self._base, state.address, task, t, blows.ctypes.data, len(blows),
+            events.ctypes.data, len(events), record_events,
+        )  # fmt: skip
+        words = state.words
+        return status, int(words[self._blow_word]), int(words[self._event_word])
+
+    def advance(
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+    ) -> tuple[int, int, int]:
+        """Commit as far as `t` allows; as in `Solver`."""
+        return self._run(ADVANCE, state, t, blows, events, record_events)
+
+    def commit(
+        self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
+    ) -> tuple[int, int, int]:
+        """Bring an advanced state to the first grid point at or after `t`; as `advance`."""
+        end = self.grid_point_after(state, t)
+        return self._run(COMMIT, state, end, blows, events, record_events)
+
+    def read(
+        self, state: State, t: float, reading: np.ndarray, spare: State | None = None,
+        peaks: bool = True,
+    ) -> State:  # fmt: skip
+        """Evaluate at `t`; a copy at the last grid point up to it. As in `Solver`."""
+        copy = spare if spare is not None else State(self.STATE, state.shapes, RECORD)
+        status = self._entries.read(
+            self._base, state.address, copy.address, t, reading.ctypes.data, peaks
+        )
+        if status != Status.DONE:
+            raise RuntimeError(f"the {self.name} solver stopped: {Status(status).name}")
+        return copy
+
+    def set_inputs(self, state: State, **inputs: float) -> None:
+        """Change inputs of a committed state; those of the rock wait for the next cycle."""
+        words = words_of(self.STATE)
+        for name, value in inputs.items():
+            state.numbers[words[INPUTS[name].field]] = value
+
+    # samples
+
+    def sample(self, state: State, times: np.ndarray, out: np.ndarray) -> None:
+        """Evaluate at `times` into rows of `SAMPLE_FIELDS`."""
+        self._sample(state, times, out, np.zeros(1, BLOW), np.zeros(1, EVENT), False, False)
+
+    def sample_ahead(
+        self, state: State, times: np.ndarray, out: np.ndarray, blows: np.ndarray,
+        events: np.ndarray, record_events: bool,
+    ) -> tuple[int, int, int, int]:  # fmt: skip
+        """Advance through rising `times` and evaluate at each; as in `Solver`."""
+        return self._sample(state, times, out, blows, events, record_events, True)
+
+    def _sample(
+        self, state: State, times: np.ndarray, out: np.ndarray, blows: np.ndarray,
+        events: np.ndarray, record_events: bool, advances: bool,
+    ) -> tuple[int, int, int, int]:  # fmt: skip
+        times, done = np.ascontiguousarray(times, np.float64), np.zeros(1, np.int64)
+        rows = out
+        if not out.flags.c_contiguous:
+            rows = np.zeros((len(times), len(SAMPLE_FIELDS)))
+        copy, reading = State(self.STATE, state.shapes, RECORD), np.zeros(1, READING)
+        status = self._entries.sample(
+            self._base, state.address, copy.address, advances, times.ctypes.data, len(times),
+            reading.ctypes.data, rows.ctypes.data, blows.ctypes.data, len(blows),
+            events.ctypes.data, len(events), record_events, done.ctypes.data,
+        )  # fmt: skip
+        if rows is not out:
+            out[:] = rows
+        words = state.words
+        return status, int(words[self._blow_word]), int(words[self._event_word]), int(done[0])
+
+    # fields
+
+    def fields(self, state: State) -> dict[str, np.ndarray]:
+        """Elastic force [N] and velocity [m/s] of each cell, top to bottom, by bar."""
+        out = {}
+        for name in self._names:
+            force, velocity = self._fields_of(name, state)
+            out[f"{name}_force"], out[f"{name}_velocity"] = force, velocity
+        return out
+
+    def _fields_of(self, name: str, state: State) -> np.ndarray:
+        bar, mass = _bar_number(name), self._grid(name).mass
+        form = self._entries.shape_form(self._base, state.address, bar)
+        shapes, out = self._shapes_of(name, form), np.zeros((2, len(mass)))
+        self._entries.fields(
+            self._base, state.address, bar, mass.ctypes.data, shapes.ctypes.data, shapes.shape[1],
+            len(mass), out.ctypes.data, out[1:].ctypes.data,
+        )  # fmt: skip
+        return out
+
+    def _shapes_of(self, name: str, form: int) -> np.ndarray:
+        """What modes have in the cells of a bar; none where there are no modes."""
+        key = (name, form)
+        if key not in self._shapes:
+            image, bar, count = self._image.ctypes.data, _bar_number(name), 0
+            if form >= 0:
+                count = self._entries.shapes(image, bar, form, 0)
+            shapes = np.zeros((2, count, self._grid(name).n))
+            if count:
+                self._entries.shapes(image, bar, form, shapes.ctypes.data)
+            self._shapes[key] = shapes
+        return self._shapes[key]
+
+    def force_in(self, state: State, bar: str, cell: int) -> float:
+        """Force in one cell of a bar [N], as `fields` reads it."""
+        return float(self._fields_of(bar, state)[0, cell]) if bar in self._names else 0.0
+
+    def grid_of(self, bar: str) -> Grid | None:
+        """Cells of a bar, None where it has none."""
+        return self._grid(bar) if bar in self._names else None
+
+    def section_cells(self, bar: Bar) -> list[int]:
+        """Cells in each section of an elastic bar."""
+        name = next(name for name, one in self.scene.bars.items() if one is bar)
+        return list(self._grid(name).in_sections)
