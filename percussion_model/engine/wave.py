@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from percussion_model.engine.checks import arrays_are_bounded, record_fault
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import gauge_sections, new_values, numbers_in
@@ -57,7 +55,6 @@ from percussion_model.solvers.wave.records import (
     Chain,
     Has,
     Place,
-    Steel,
     Task,
     Waves,
 )
@@ -70,7 +67,7 @@ PAR_BYTES = WAVE_PAR.itemsize
 WORK = work_at(WAVE_STATE)  # place of the first array in what moves
 ROWS_LISTED = tuple(words_of(WAVE_STATE)[name] for name in ("n_blows", "n_events"))
 BAR_ROWS, JOINT_ROWS = len(Bar), len(Has)
-CELLS, IMPEDANCE, GIVEN = Place.CELLS.value, Steel.IMPEDANCE.value, Bar.GIVEN.value
+CELLS, GIVEN = Place.CELLS.value, Bar.GIVEN.value
 # A state is no more than a step, and rounding, behind the present [steps].
 MOST_BEHIND = 2.0
 PLACES, STEEL, WEIGHTS, PASSAGE, FITS, BODIES, BARS, JOINTS, CAME, RINGS = range(10)
@@ -314,14 +311,9 @@ def fields(base, moving, bar, masses, made, modes, count, force, velocity):
     chain, waves = chain_of(base), waves_in(base, moving, moving)
     which = _which(bar, parameters(base)[0].struck, len(chain.bodies))
     out, speed, step = floats_at(force, count), floats_at(velocity, count), state_in(moving)[0].step
-    d, u = np.zeros(count), np.zeros(count)
-    fill_cells(chain, waves.rings, step, which, d, u)
-    cell, given = 0, 2.0 * waves.bars[GIVEN, which]
-    for k in range(int(chain.bodies[which, Body.FIRST]), int(chain.bodies[which, Body.LAST]) + 1):
-        for _ in range(chain.places[k, CELLS]):
-            out[cell] = chain.steel[k, IMPEDANCE] * (d[cell] - u[cell])
-            speed[cell] = d[cell] + u[cell] + given
-            cell += 1
+    fill_cells(chain, waves.rings, step, which, out, speed)
+    for k in range(count):
+        speed[k] += 2.0 * waves.bars[GIVEN, which]
     return 0
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from percussion_model import Mode, Scene, Section, Simulation
+from percussion_model import Mode, Scene, SceneError, Section, Simulation
 from percussion_model.engine.solvers import WaveSolver
+from percussion_model.physics.kernel import entry_of
 from percussion_model.physics.records import BLOW, EVENT
 from percussion_model.solvers.wave.records import Place, Steel
+from percussion_model.solvers.wave.taps import on_the_way, width_of
 from tests.engine_views import chain_of
 
 L = 0.20125
@@ -185,3 +187,37 @@ def test_static_load_keeps_its_waves():
     for name, values in simulation.fields().items():
         scale = 1e-12 * np.abs(before[name]).max() if "force" in name else 1e-15
         np.testing.assert_allclose(values, before[name], atol=scale, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("transit", "eta"), [(1.4, 0.1), (24.0, 0.14), (24.4, 0.14), (60.0, 1.0), (240.4, 2.0)]
+)
+def test_waves_in_cells_are_as_late_and_as_wide_as_their_way_makes_them(transit, eta):
+    """exp(-s x / sqrt(1 + eta s)), of stress by sqrt(1 + eta s): the first two cumulants."""
+    cells = max(1, round(transit))
+    weights, reach = entry_of(on_the_way)(cells, transit, eta, eta)
+    rows = weights.reshape(2, cells, entry_of(width_of)(reach))
+    late = reach + 1.0 - np.arange(rows.shape[2])
+    way = (np.arange(cells) + 0.5) * transit / cells
+    mean = rows @ late
+    variance = rows @ late**2 - mean**2
+    np.testing.assert_allclose(rows.sum(axis=2), 1.0, rtol=1e-12)
+    for k, (more, wider) in enumerate([(0.0, 0.0), (eta / 2, eta**2 / 2)]):
+        wanted = way - (np.arange(cells) + 0.5) + more
+        np.testing.assert_allclose(mean[k], wanted, rtol=0.0, atol=0.01 * max(1.0, eta))
+        np.testing.assert_allclose(variance[k], eta * way + wider, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"loss.time": 1.94e-5},  # more than half a transit time
+        {"loss.time": 2e-6, "solver.cells": 24},
+        {"loss.time": 2e-6, "bit.sections": (Section(length=0.02, area=5.5e-3),)},
+    ],
+    ids=["much", "fine", "short"],
+)
+def test_loss_that_bars_cannot_have_is_refused(changes):
+    """Waves had none of it at the ends then: 31 mm/s in place of 15, or a stalled hammer."""
+    with pytest.raises(SceneError, match=r"loss\.time = .* s: too long for waves in 0\."):
+        WaveSolver(Scene().computed_by("wave", **changes))

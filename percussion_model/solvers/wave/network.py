@@ -26,11 +26,14 @@ from percussion_model.solvers.wave.resolution import (
     STEPS_OF_TWO,
     steps_for,
 )
-from percussion_model.solvers.wave.taps import WHOLE, on_the_way, turning, weights_of
+from percussion_model.solvers.wave.taps import WHOLE, on_the_way, turning, weights_of, width_of
 
 # Bars are lossy at their ends as well where their sections have this share of their loss: the ends
-# of others would make energy.
-LEAST_OF_ENDS = 0.9
+# of others would make energy. Without them loss is off by up to 5 %, which may stall a hammer; so
+# they may only be missing where the Kelvin-Voigt time is this share of a step.
+LEAST_OF_ENDS, MOST_WITHOUT_ENDS = 0.9, 0.25
+# Where loss needs longer steps, they grow by about this.
+LONGER = 1.05
 # Where steps are shorter than the Kelvin-Voigt time, sections must have this share of their loss.
 LEAST_SPREAD = 0.99
 # Steps in which a wave crosses any bar at least, where a scene asks for none.
@@ -38,8 +41,9 @@ FEWEST_STEPS = 4
 # Steps in which a wave crosses all bars at most, for the sake of a short wave from outside.
 MOST_FOR_PULSE = 1 << 14
 TOO_FINE = (
-    "loss.time = {eta} s: too long for a section of {length} m in steps of {step} s: take a "
-    "shorter loss.time, or fewer solver.cells"
+    "loss.time = {eta} s: too long for waves in {length} m of a bar in steps of {step} s: must be "
+    "at most about an eighth of the time in which a wave crosses the shortest bar; or take fewer "
+    'solver.cells, or for two bars modes (solver.name = "modal")'
 )
 PLACES, STEELS, FITS, BODIES = len(Place), len(Steel), len(Fit), len(Body)
 PERFECT = int(Joint.PERFECT)
@@ -82,8 +86,8 @@ class Network(NamedTuple):
     lossy_ends : int
         1 where sections have so much of their loss that ends can have theirs.
     too_fine : float
-        0 where all is well; length [m] of a section that cannot spread a wave as the loss would
-        in steps so short. The rest is then not finished.
+        0 where all is well; length [m] of a section, or bar, that cannot spread a wave as the loss
+        would in such steps. The rest is then not finished.
     """
 
     chain: Chain
@@ -169,19 +173,60 @@ def _time_step(numbers, sections, counts):
         return first / steps_for(values.solver_accuracy, len(numbers.rod_counts) > 0)
     steps = DEFAULT_STEPS if first_is_piston(numbers) else FEWEST_STEPS
     longest = first / (steps if len(numbers.rod_counts) > 0 else STEPS_OF_TWO)
-    end = counts[0]
-    for i in range(1, len(counts)):
-        begin, end = end, end + counts[i]
-        longest = min(longest, bar_transit_time(sections[begin:end]) / FEWEST_STEPS)
+    longest = min(longest, _shortest(sections, counts, 1) / FEWEST_STEPS)
     longest = min(longest, _step_of_pulse(values, sections))
     # a section shorter than a step would be longer than it is
     for k in range(len(sections)):
         longest = min(longest, section_transit_time(sections[k]))
     # and in steps shorter than the Kelvin-Voigt time short sections would lose their loss
-    least = min(kelvin_voigt_time(numbers), first)
-    if least > longest:
-        return first / math.floor(first / least)
-    return first / math.ceil(first / longest - 1e-9)
+    eta = kelvin_voigt_time(numbers)
+    count = math.ceil(first / longest - 1e-9)
+    if min(eta, first) > longest:
+        count = math.floor(first / min(eta, first))
+    return first / _steps_with_loss(sections, counts, first, count, eta)
+
+
+@preparing
+def _shortest(sections, counts, first):
+    """Transit time of the shortest bar from one on [s]; infinite where there is none."""
+    shortest, end = math.inf, 0
+    for i in range(len(counts)):
+        begin, end = end, end + counts[i]
+        if i >= first:
+            shortest = min(shortest, bar_transit_time(sections[begin:end]))
+    return shortest
+
+
+@preparing
+def _steps_with_loss(sections, counts, first, most, eta):
+    """Steps through the first bar, at most so many, in which all bars have their loss.
+
+    Where none do, steps so long that ends do not miss it; as many as asked for where they are too
+    long for a bar: then `network_of` refuses them.
+    """
+    count = most
+    while count >= 1 and eta > MOST_WITHOUT_ENDS * first / count:
+        if _have_loss(sections, counts, first / count, eta):
+            return count
+        count = min(count - 1, math.floor(count / LONGER))
+    too_few = FEWEST_STEPS * first > count * _shortest(sections, counts, 0)
+    return most if count < most and too_few else count
+
+
+@preparing
+def _have_loss(sections, counts, dt, eta):
+    """Whether the sections of each bar have enough of its loss for it to have it at its ends."""
+    k = 0
+    for bar in range(len(counts)):
+        spread = wanted = 0.0
+        for _ in range(counts[bar]):
+            transit = section_transit_time(sections[k]) / dt
+            spread += _cut(transit, eta * transit / dt).spread
+            wanted += eta * transit / dt
+            k += 1
+        if spread < LEAST_OF_ENDS * wanted:
+            return False
+    return True
 
 
 @preparing
@@ -224,16 +269,25 @@ def _appended(weights, count, row):
 
 
 @preparing
-def _fill_place(place, bar, ring, cut, first):
+def _cells_of(cut):
+    """How many cells a section is read in."""
+    return max(1, math.floor(cut.mean) if cut.taps == 1 else round(cut.mean))
+
+
+@preparing
+def _fill_place(place, bar, ring, cut, first, passed, reach):
     """Fill a row of `Place`."""
+    cells = _cells_of(cut)
+    needed = max(cut.delay + cut.taps + 1, cells + reach + 1)
+    if reach > 0:
+        needed = max(needed, width_of(reach))
     size = 1
-    while size < cut.delay + cut.taps + 1:
+    while size < needed:
         size *= 2
-    cells = math.floor(cut.mean) if cut.taps == 1 else round(cut.mean)
     place[Place.BAR], place[Place.RING], place[Place.SIZE] = bar, ring, size
     place[Place.DELAY], place[Place.TAPS] = cut.delay - 1, cut.taps
     place[Place.WEIGHTS] = -1 if len(cut.row) == 1 else first
-    place[Place.CELLS] = max(1, cells)
+    place[Place.CELLS], place[Place.PASSAGE], place[Place.REACH] = cells, passed, reach
 
 
 @preparing
@@ -265,14 +319,11 @@ def network_of(numbers, plan):
             if dt < eta and cut.spread < LEAST_SPREAD * wanted and too_fine == 0.0:
                 too_fine = section[LENGTH]
             misfit = max(misfit, abs(cut.mean / transit - 1.0))
-            _fill_place(places[k], bar, ring, cut, used)
+            row, reach = on_the_way(_cells_of(cut), cut.mean, cut.spread / cut.mean, eta / dt)
+            _fill_place(places[k], bar, ring, cut, used, passed, reach)
             weights = _appended(weights, used, cut.row)
             used += len(cut.row)
             spread, all_wanted = spread + cut.spread, all_wanted + wanted
-            row, reach = on_the_way(
-                places[k, Place.CELLS], cut.spread / transit, places[k, Place.SIZE]
-            )
-            places[k, Place.PASSAGE], places[k, Place.REACH] = passed, reach
             passage = _appended(passage, passed, row)
             passed += len(row)
             ring += 4 * places[k, Place.SIZE] + 2
@@ -291,6 +342,9 @@ def network_of(numbers, plan):
         bodies[bar, Body.INV_MASS] = 1.0 / bodies[bar, Body.MASS]
         if spread < LEAST_OF_ENDS * all_wanted:
             lossy_ends = 0
+            if eta > MOST_WITHOUT_ENDS * dt and too_fine == 0.0:
+                for section in plan.sections[begin:k]:
+                    too_fine += section[LENGTH]
     struck = int(first_is_piston(numbers))
     fits = _fits(numbers, steel, bodies[struck:])
     chain = Chain(places, steel, _first(weights, used), _first(passage, passed), fits, bodies)

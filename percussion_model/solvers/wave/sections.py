@@ -17,6 +17,8 @@ GIVEN = int(Bar.GIVEN)
 # these, and the impulses on the upper and the lower end of a bar and its acceleration.
 DOWN, UP, DOWN_OUT, UP_OUT, FROM_ABOVE, FROM_BELOW, ACCELERATION = range(7)
 CAME_ROWS = 7
+# What waves are read for in cells.
+VELOCITY_OF, STRESS_OF = 0, 1
 
 
 @inlined
@@ -175,53 +177,61 @@ def sent_to_cell(places, rings, step, k, way, cell):
 
 
 @kernel
-def wave_in_cell(chain, rings, step, k, way, cell):
+def wave_in_cell(chain, rings, step, k, way, cell, of):
     """A wave of a section in a cell, counted from the top, without what body forces gave.
 
-    On its way there loss has spread it, as it does on the whole way through the section.
+    On its way there loss has spread it, as it does on the whole way through the section; `of` is
+    VELOCITY_OF, or STRESS_OF: by a wave in stress, Z times which is a force.
     """
     places, size, reach = chain.places, chain.places[k, SIZE], chain.places[k, REACH]
     if reach == 0:
         return sent_to_cell(places, rings, step, k, way, cell)
     age = cell if way == 0 else places[k, CELLS] - 1 - cell
     start, row = places[k, RING] + 2 * size * way, width_of(reach)
-    weight = places[k, PASSAGE] + age * row
+    weight = places[k, PASSAGE] + (of * places[k, CELLS] + age) * row
     if age >= reach:
-        first = start + ((step - age - reach) & (size - 1))
+        first = start + ((step - age - reach - 1) & (size - 1))
         sums = load(chain.passage, 0, weight) * load(rings, 0, first)
         for j in range(WIDTH, row, WIDTH):
             sums = sums + load(chain.passage, 0, weight + j) * load(rings, 0, first + j)
         return total(sums)
     newest, wave = rings[0, start + (step & (size - 1))], 0.0
-    for j in range(-reach, reach + 1):
-        then = abs(age + j)
-        sent = rings[0, start + ((step - then) & (size - 1))]
+    for j in range(2 * reach + 2):
+        back = age + reach + 1 - j
+        sent = rings[0, start + ((step - abs(back)) & (size - 1))]
         # what is still to come goes on in a straight line
-        sent = sent if age + j >= 0 else 2.0 * newest - sent
-        wave += chain.passage[0, weight + reach + j] * sent
+        sent = sent if back >= 0 else 2.0 * newest - sent
+        wave += chain.passage[0, weight + j] * sent
     return wave
 
 
 @kernel
 def force_in(chain, rings, step, bar, cell):
-    """Force in a cell of a bar, compression positive [N]."""
+    """Elastic force in a cell of a bar, compression positive [N]."""
     k, last = int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST])
     while k < last and cell >= chain.places[k, CELLS]:
         cell -= chain.places[k, CELLS]
         k += 1
-    down = wave_in_cell(chain, rings, step, k, 0, cell)
-    up = wave_in_cell(chain, rings, step, k, 1, cell)
+    down = wave_in_cell(chain, rings, step, k, 0, cell, STRESS_OF)
+    up = wave_in_cell(chain, rings, step, k, 1, cell, STRESS_OF)
     return chain.steel[k, IMPEDANCE] * (down - up)
 
 
 @kernel
-def fill_cells(chain, rings, step, bar, down, up):
-    """Fill in both waves of each cell of a bar, without what body forces gave [m/s]."""
+def fill_cells(chain, rings, step, bar, force, velocity):
+    """Fill in elastic force [N] and velocity [m/s] of each cell of a bar.
+
+    Velocities are without what body forces gave.
+    """
     at = 0
     for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
         for cell in range(chain.places[k, CELLS]):
-            down[at] = wave_in_cell(chain, rings, step, k, 0, cell)
-            up[at] = wave_in_cell(chain, rings, step, k, 1, cell)
+            down = wave_in_cell(chain, rings, step, k, 0, cell, STRESS_OF)
+            up = wave_in_cell(chain, rings, step, k, 1, cell, STRESS_OF)
+            force[at] = chain.steel[k, IMPEDANCE] * (down - up)
+            down = wave_in_cell(chain, rings, step, k, 0, cell, VELOCITY_OF)
+            up = wave_in_cell(chain, rings, step, k, 1, cell, VELOCITY_OF)
+            velocity[at] = down + up
             at += 1
 
 
@@ -261,8 +271,8 @@ def kinetic_of_bar(chain, waves, step, bar):
     for k in range(int(chain.bodies[bar, FIRST]), int(chain.bodies[bar, LAST]) + 1):
         one = 0.0
         for cell in range(chain.places[k, CELLS]):
-            v = wave_in_cell(chain, waves.rings, step, k, 0, cell)
-            v += wave_in_cell(chain, waves.rings, step, k, 1, cell) + 2.0 * given
+            v = wave_in_cell(chain, waves.rings, step, k, 0, cell, VELOCITY_OF)
+            v += wave_in_cell(chain, waves.rings, step, k, 1, cell, VELOCITY_OF) + 2.0 * given
             one += v * v
         energy += 0.5 * chain.steel[k, CELL_MASS] * one
     return energy

@@ -41,8 +41,9 @@ THIRD = 2.25
 REACH, LEAST_REACH = 4.5, 4.0
 # In so many rounds the variance of what ends comes right to rounding.
 ROUNDS = 8
-# Waves on their way are spread over so many standard deviations.
-REACH_ON_THE_WAY = 3.0
+# Waves on their way are spread over so many standard deviations, and are no more skewed than this,
+# nor than by so much times that deviation: few samples in the first cells would not carry it.
+REACH_ON_THE_WAY, MOST_SKEWED, SKEWED_BY_WIDTH = 3.5, 1.0, 0.25
 # Weights below this, at either end, are rounding.
 NOTHING = 1e-18
 
@@ -75,7 +76,7 @@ def weights_of(transit, variance):
     reach = min(whole - 1, math.ceil(REACH * math.sqrt(rest)))
     if rest >= LEAST_SAMPLED and reach >= LEAST_REACH * math.sqrt(rest):
         third = THIRD * rest * rest / transit
-        return whole - reach, samples(part, rest, third, reach), rest
+        return whole - reach, samples(part, rest, third, reach, True), rest
     rounds = min(math.ceil(0.5 * rest / MOST_SPREAD), room)
     if rounds == 0:
         return delay, weights, 0.0
@@ -125,15 +126,19 @@ def _scaled(weights):
 
 
 @preparing
-def samples(middle, variance, third, reach):
+def samples(middle, variance, third, reach, all_three):
     """Samples of a gamma distribution so wide that they have its moments though they end.
 
     Parameters
     ----------
     middle : float
-        Mean, from the sample `reach` on, from 0 to 1 [steps].
+        Mean, from the sample `reach` on [steps].
     variance, third : float
         Second and third cumulant [steps^2, steps^3].
+    reach : int
+        Samples on either side.
+    all_three : bool
+        Whether they have the third as well, else about that.
 
     Returns
     -------
@@ -162,53 +167,74 @@ def samples(middle, variance, third, reach):
             cube, rest = add(cube, rest, weights[k] * (off * off * off))
         place += middle - mean
         wide *= math.sqrt(variance / (moment + lost))
-        skewed += third - (cube + rest)
+        if all_three:
+            skewed += third - (cube + rest)
     return weights
 
 
 @inlined
 def width_of(reach):
     """Weights of a cell: of its reach, in whole lanes."""
-    return (2 * reach + WIDTH) // WIDTH * WIDTH
+    return (2 * reach + 1 + WIDTH) // WIDTH * WIDTH
 
 
 @preparing
-def on_the_way(cells, spread, size):
-    """Weights by which a wave has been spread in each cell on its way, row by row.
+def on_the_way(cells, transit, spread, eta):
+    """Weights by which waves are read in each cell: first for velocities, then for stress.
+
+    On its way to a cell a wave has been spread. Stress is that of waves by 1 / sqrt(1 + eta s)
+    (docs/numerics.md, eq. 4a), whose cumulants are eta / 2, eta^2 / 2, eta^3.
 
     Parameters
     ----------
     cells : int
+        Of one length, in each of which a wave is read in the middle.
+    transit : float
+        Time in which a wave crosses them all [steps].
     spread : float
         Variance that a step adds [steps^2].
-    size : int
-        Of the ring that they are to be applied to.
+    eta : float
+        Kelvin-Voigt time [steps].
 
     Returns
     -------
     weights : ndarray
-        Of a cell 2 reach + 1 of them, alike on both sides, in whole lanes; then of the next.
+        Of a cell, the newest last, in whole lanes; then of the next; then all anew for stress.
     reach : int
-        0: nothing is spread, and there are no weights.
+        They are of so many steps after a cell's own, and one more before it. 0: nothing is spread
+        nor late, and there are no weights.
     """
-    reach = math.ceil(REACH_ON_THE_WAY * math.sqrt(cells * spread))
-    reach = min(reach, (size - WIDTH) // 2)
-    if spread == 0.0 or reach < 1:
+    if spread == 0.0 and eta == 0.0:
         return np.zeros(0), 0
-    weights = np.zeros(cells * width_of(reach))
+    square = 0.5 * eta * eta
+    wide = REACH_ON_THE_WAY * math.sqrt(transit * spread + square)
+    reach = math.ceil(wide + 0.5 * eta + abs(transit - cells))
+    row = width_of(reach)
+    weights = np.zeros(2 * cells * row)
     for cell in range(cells):
-        variance, middle = (cell + 0.5) * spread, cell * width_of(reach) + reach
-        if 0.5 * variance <= UTMOST_SPREAD:
-            weights[middle - 1] = weights[middle + 1] = 0.5 * variance
-            weights[middle] = 1.0 - variance
-        else:  # of a normal distribution, which is near enough to read them
-            whole = 0.0
-            for j in range(-reach, reach + 1):
-                weights[middle + j] = exp(-0.5 * j * j / variance)
-                whole += weights[middle + j]
-            for j in range(-reach, reach + 1):
-                weights[middle + j] /= whole
+        steps = (cell + 0.5) * transit / cells
+        late, variance = steps - (cell + 0.5), steps * spread
+        third = THIRD * variance * spread
+        _fill_row(weights, cell * row, reach, late, variance, third)
+        late, variance, third = late + 0.5 * eta, variance + square, third + 2.0 * eta * square
+        _fill_row(weights, (cells + cell) * row, reach, late, variance, third)
     return weights, reach
+
+
+@preparing
+def _fill_row(weights, at, reach, mean, variance, third):
+    """Weights with the first cumulants of how late a wave is [steps, steps^2, steps^3]."""
+    here = at + reach + 1
+    if variance < LEAST_SAMPLED:
+        second = variance + mean * mean
+        weights[here - 1], weights[here + 1] = 0.5 * (second + mean), 0.5 * (second - mean)
+        weights[here] = 1.0 - second
+        return
+    skewness = min(MOST_SKEWED, SKEWED_BY_WIDTH * math.sqrt(variance))
+    third = min(third, skewness * variance * math.sqrt(variance))
+    found = samples(mean, variance, third, reach, False)
+    for late in range(-reach, reach + 2):
+        weights[here - late] = found[reach + late]
 
 
 @preparing
