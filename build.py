@@ -213,6 +213,15 @@ def test(extra: list[str]) -> int:
     return next((code for code in codes if code), 0)
 
 
+def wheels(extra: list[str]) -> int:
+    """Build wheels with compiled solvers, of all platforms or those named."""
+    code = install()
+    if code == 0 and call([tool("python"), "-c", "import ziglang"]) != 0:
+        code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
+                     "-e", ".[native]"], silent="installing a linker")  # fmt: skip
+    return code or call([tool("python"), "-m", "fmu_src.wheels", *extra])
+
+
 def bench(extra: list[str]) -> int:
     """Measure speed."""
     code = install()
@@ -266,6 +275,8 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("system", help="build drilling systems of FMUs as SSP: NAMES "
                         "or all, -o FOLDER; no name: list them", add_help=False)  # fmt: skip
     commands.add_parser("docs", help="build the documentation site; more goes to sphinx-build")
+    commands.add_parser("wheels", help="build wheels with compiled solvers: PLATFORMS, -o FOLDER",
+                        add_help=False)  # fmt: skip
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
     choice, extra = parser.parse_known_args(arguments)
     started = time.monotonic()
@@ -278,7 +289,7 @@ def main(arguments: list[str]) -> int:
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
         work = {"run": run, "fmu": fmu, "native": native, "system": system, "docs": docs,
-                "test": test, "bench": bench}  # fmt: skip
+                "test": test, "bench": bench, "wheels": wheels}  # fmt: skip
         return work[choice.command](extra)
     except KeyboardInterrupt:
         print("\nInterrupted.", file=sys.stderr)

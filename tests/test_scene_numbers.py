@@ -12,7 +12,6 @@ from percussion_model.scene.bar_groups import BitBar, Section
 from percussion_model.scene.hammers import hammer
 from percussion_model.scene.numbers import (
     SCENE_NUMBERS,
-    kernel_numbers,
     numbers_of,
     scene_numbers,
     section_numbers,
@@ -103,4 +102,3 @@ def test_rods_of_any_number_lie_in_one_array():
     for found, rod in zip(numbers.rods, scene.string.rods, strict=True):
         np.testing.assert_array_equal(found, section_numbers(rod))
     assert numbers_of(Scene()).rods == []
-    assert kernel_numbers(scene).values.tobytes() == scene_numbers(scene).tobytes()

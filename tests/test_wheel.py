@@ -19,13 +19,17 @@ import pytest
 
 from fmu_src.hammer.build import build_hammer
 from fmu_src.native.library import PLATFORMS, stamp
+from fmu_src.wheels import make_wheel
 from percussion_model import Scene, simulate
+from percussion_model.engine.compiler import compiler_for
+from percussion_model.engine.platforms import this_platform
 from percussion_model.scene.presets import scene_presets
 from tests.installed import build_wheel, expected_files, plain_environment, try_python
 
 # Beside the packages: what a wheel says of itself.
 ABOUT = {"METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE"}
 SHORT = {"duration": 0.5, "settle": 0.1}
+TWO_TENTHS = ("--duration", "0.2", "--settle", "0")
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +52,65 @@ def installed(wheel, built_library, tmp_path_factory):
     return made
 
 
+@pytest.fixture(scope="module")
+def bare(built_library, tmp_path_factory):
+    """The wheel for this platform where nothing compiles: no numba, no compiler, no cache."""
+    pytest.importorskip("hatchling")
+    if not built_library:
+        pytest.skip("no C compiler, and no ziglang")
+    folder = tmp_path_factory.mktemp("bare")
+    wheel = make_wheel(this_platform(), compiler_for(this_platform()), folder)
+    outer = {sysconfig.get_path(name) for name in ("purelib", "platlib")}
+    made = plain_environment(folder, wheel, sorted(outer))
+    (site,) = (folder / "venv").glob("[Ll]ib/**/site-packages")
+    absent = "import sys; sys.modules.update(dict.fromkeys(('numba', 'llvmlite', 'scipy')))\n"
+    (site / "absent.pth").write_text(absent, encoding="utf-8")
+    made.variables["PATH"] = str(made.program("percussion").parent)
+    made.variables["PYTHONDONTWRITEBYTECODE"] = "1"
+    return made
+
+
+def test_a_wheel_for_a_platform_compiles_nothing_and_writes_nothing(bare):
+    def files():
+        return {path for path in bare.folder.parent.rglob("*") if path.is_file()}
+
+    before = files()
+    for words in (["reference"], ["t38_rods"], ["drop_test"], ["rigid"]):
+        out = bare.percussion("run", *words, *TWO_TENTHS, "--json", "-")
+        here = simulate(Scene.from_toml(scene_presets()[words[0]]), 0.2, settle=0.0).summary()
+        assert json.loads(out)["blows"] == here["blows"]
+        assert json.loads(out)["energy"] == here["energy"]
+    assert files() == before
+    refused = bare.call("accuracy", "reference")
+    assert refused.returncode == 2
+    assert "scipy is missing: pip install 'percussion_model[fit]'" in refused.stderr
+
+
+def test_a_wheel_for_a_platform_makes_fmus_without_compiling(bare, built_library):
+    bare.percussion("fmu", "rigid", "-o", "Hammer.fmu")
+    bare.percussion("native", "rigid", "-o", "native")
+    bare.percussion("system", "FeedControlRigid", "-o", "systems")
+    done = bare.call("couple", "systems/FeedControlRigid.ssp", "--duration", "0.2",
+                     "--no-figures", "--json", "-")  # fmt: skip
+    assert json.loads(done.stdout)["time"] == pytest.approx(0.2)
+    names = zipfile.ZipFile(bare.empty / "Hammer.fmu").namelist()
+    assert any(name.startswith("resources/native/") for name in names)
+
+
+def test_a_library_of_other_sources_is_not_taken(bare):
+    """An edit of an installed file: the library is refused, and what compiles is missing."""
+    (source,) = (bare.folder).rglob("percussion_model/physics/rock.py")
+    before = source.read_text(encoding="utf-8")
+    source.write_text(before + "\n", encoding="utf-8")
+    try:
+        refused = bare.call("run", "reference", *TWO_TENTHS)
+    finally:
+        source.write_text(before, encoding="utf-8")
+    assert refused.returncode == 2
+    assert "the sources of the solvers have changed" in refused.stderr
+    assert 'pip install "percussion_model[compile]"' in refused.stderr
+
+
 def test_the_wheel_has_every_file_and_no_other(wheel):
     found = set(zipfile.ZipFile(wheel).namelist())
     about = {name.partition(".dist-info/")[2] for name in found if ".dist-info/" in name}
@@ -62,7 +125,7 @@ def test_users_get_no_tools_of_development(wheel):
     (name,) = (one for one in archive.namelist() if one.endswith("/METADATA"))
     needed = message_from_bytes(archive.read(name)).get_all("Requires-Dist")
     plain = {text.partition(">")[0] for text in needed if "extra ==" not in text}
-    assert plain == {"numpy", "scipy", "numba", "typer", "rich", "tomli-w", "pint"}
+    assert plain == {"numpy", "typer", "rich", "tomli-w", "pint"}
     of_all = [text for text in needed if "extra == 'all'" in text]
     assert of_all
     for tool in ("ruff", "mypy", "pytest", "hypothesis", "import-linter", "ecospy", "hatchling"):

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-import numba  # noqa: F401  # where it is missing, that is told before the first step
-
 from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS

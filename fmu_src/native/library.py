@@ -74,6 +74,17 @@ def kept_folder() -> Path:
     return cache_folder() / "native"
 
 
+def brought_file(name: str) -> Path:
+    """Where an installation has the library for a platform, if it brings one."""
+    return HERE / "libraries" / f"{name}-{stamp()}{PLATFORMS[name].suffix}"
+
+
+def _file_in(folder: Path, name: str) -> Path:
+    """File of the library for a platform: what is brought, or else in a folder."""
+    brought = brought_file(name)
+    return brought if brought.is_file() else folder / f"{name}{PLATFORMS[name].suffix}"
+
+
 def libraries(
     names: Sequence[str] | Mapping[str, str],
     kept: Path | None = None,
@@ -94,9 +105,7 @@ def libraries(
     """
     words = names if isinstance(names, Mapping) else {name: name for name in names}
     folder = (kept or kept_folder()) / stamp()
-    files = {
-        name: folder / f"{name}{PLATFORMS[name].suffix}" for name in words if name in PLATFORMS
-    }
+    files = {name: _file_in(folder, name) for name in words if name in PLATFORMS}
     compilers = {
         name: compiler_for(name, words[name])
         for name in words
@@ -115,15 +124,26 @@ def _compile(
     files: Mapping[str, Path], compilers: Mapping[str, Sequence[str]], report: Report | None
 ) -> None:
     """Compile libraries by platform."""
+    if files:
+        objects(MODULES, list(files), report)
+    for name, file in files.items():
+        link_fmus(name, compilers[name], file)
+
+
+def link_fmus(name: str, command: Sequence[str], file: Path) -> None:
+    """Link the library of FMUs for a platform.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Of a C compiler.
+    """
     import fmpy
 
-    if not files:
-        return
-    parts = objects(MODULES, list(files), report)
+    parts = objects(MODULES, [name])[name]
     headers = f"-isystem{Path(fmpy.__file__).parent / 'c-code'}"
     sources = [*sorted(HERE.glob("*.c")), ENGINE / "memory.c"]
-    for name, file in files.items():
-        link(name, compilers[name], sources, parts[name], file, [f"-I{HERE}", headers])
+    link(name, command, sources, parts, file, [f"-I{HERE}", headers])
 
 
 @functools.cache

@@ -11,6 +11,7 @@ import ctypes
 import math
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -251,8 +252,8 @@ class CompiledStep:
 
 
 def can_compile(ports: Sequence[Port]) -> bool:
-    """Whether all parts are FMUs, with nothing on the way."""
-    return all(
+    """Whether all parts are FMUs, with nothing on the way, and there is what compiles."""
+    return find_spec("numba") is not None and all(
         isinstance(port.part, Component) and port.on_way is None and not port.converts
         for port in ports
     )

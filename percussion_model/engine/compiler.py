@@ -113,7 +113,12 @@ def stamp_of(module: str) -> str:
 
 
 def kept_folders() -> list[Path]:
-    """Folders in which objects and libraries may be kept: of a clone, and of the user."""
+    """Folders in which objects and libraries may be kept: of a clone, and of the user.
+
+    What an FMU has brought along is closed to others; so is what is made of it.
+    """
+    if NAME != "percussion_model":
+        return [PACKAGE.parent / "compiled"]
     return [ROOT / "dist" / "engine"] * is_clone() + [cache_folder() / "engine"]
 
 
@@ -124,7 +129,10 @@ def kept_folder() -> Path:
 
 def can_compile() -> bool:
     """Whether there is what makes objects."""
-    return importlib.util.find_spec("numba") is not None
+    try:
+        return importlib.util.find_spec("numba") is not None
+    except ImportError:
+        return False
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model.engine.checks import arrays_are_bounded, record_fault
+from percussion_model.engine.defaults import shape_form, shapes, table_key  # noqa: F401  # entries
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import new_values, numbers_in
 from percussion_model.engine.layout import (
@@ -91,12 +92,6 @@ def refuse(image, facts):
     told[0], told[1] = elements_wanted(numbers), MOST_CELLS
     hold(values)
     return 0 if told[0] <= told[1] else Fault.ELEMENTS.value
-
-
-@preparing
-def table_key(image, key):
-    """0: tables are made in no time."""
-    return 0
 
 
 @preparing
@@ -245,18 +240,6 @@ def cells(image, bar, counts, masses):
         floats_at(masses, len(mass))[:] = mass
     hold(values)
     return len(mass)
-
-
-@preparing
-def shape_form(base, moving, bar):
-    """-1: no shapes are needed."""
-    return -1
-
-
-@preparing
-def shapes(image, bar, form, out):
-    """0: there are none."""
-    return 0
 
 
 @preparing

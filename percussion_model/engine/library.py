@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -39,12 +39,17 @@ def stamp() -> str:
     return compiler.hash_of([*sorted(files), compiler.HERE / "memory.c"])
 
 
+def brought_file(solver: str, platform: str) -> Path:
+    """Where an installation has the library of a solver, if it brings one."""
+    return BROUGHT / f"{solver}-{stamp()}{PLATFORMS[platform].suffix}"
+
+
 def _library_file(solver: str) -> Path:
     """File of the library of a solver, which need not be there."""
-    name = f"{solver}-{stamp()}{PLATFORMS[this_platform()].suffix}"
-    places = [BROUGHT, *(folder / "libraries" for folder in compiler.kept_folders())]
-    found = next((one / name for one in places if (one / name).is_file()), None)
-    return found or compiler.kept_folder() / "libraries" / name
+    brought = brought_file(solver, this_platform())
+    places = [folder / "libraries" / brought.name for folder in compiler.kept_folders()]
+    found = next((one for one in (brought, *places) if one.is_file()), None)
+    return found or compiler.kept_folder() / "libraries" / brought.name
 
 
 def place_to_compile(solver: str) -> Path | None:
@@ -89,14 +94,26 @@ def make(solver: str, report: compiler.Report | None = None) -> None:
     if file.is_file():
         return
     name = this_platform()
-    parts = compiler.objects([module_of(solver)], [name], report)[name]
+    compiler.objects([module_of(solver)], [name], report)
     command = compiler.compiler_for(name)
     file.parent.mkdir(parents=True, exist_ok=True)
     with compiler.only_one(file.parent / "link.lock"):
         if not file.is_file():
-            source, flags = compiler.HERE / "memory.c", ["-DENGINE_LIBRARY"]
-            compiler.link(name, command, [source], parts, file, flags)
+            link_solver(solver, name, command, file)
             compiler.remove_old(file.parent, f"{solver}-*{file.suffix}")
+
+
+def link_solver(solver: str, platform: str, command: Sequence[str], file: Path) -> None:
+    """Link the library of a solver for a platform.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Of a C compiler.
+    """
+    parts = compiler.objects([module_of(solver)], [platform])[platform]
+    source, flags = compiler.HERE / "memory.c", ["-DENGINE_LIBRARY"]
+    compiler.link(platform, command, [source], parts, file, flags)
 
 
 def _functions(solver: str, suffix: str, address_of: Callable[[str], int]) -> SimpleNamespace:

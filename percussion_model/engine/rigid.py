@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from percussion_model.engine.checks import record_fault
+from percussion_model.engine.defaults import shape_form, shapes, table_key  # noqa: F401  # entries
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import new_values, numbers_in
 from percussion_model.engine.layout import (
@@ -36,12 +37,6 @@ ROWS_LISTED = tuple(words_of(RIGID_STATE)[name] for name in ("n_blows", "n_event
 @preparing
 def refuse(image, facts):
     """0: all scenes can be set up."""
-    return 0
-
-
-@preparing
-def table_key(image, key):
-    """0: there are no tables."""
     return 0
 
 
@@ -137,18 +132,6 @@ def find_fault(base, moving, t, facts):
 @preparing
 def cells(image, bar, counts, masses):
     """0: rigid bodies have no cells."""
-    return 0
-
-
-@preparing
-def shape_form(base, moving, bar):
-    """-1: no shapes are needed."""
-    return -1
-
-
-@preparing
-def shapes(image, bar, form, out):
-    """0: there are none."""
     return 0
 
 

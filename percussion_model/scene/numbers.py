@@ -58,12 +58,6 @@ def numbers_of(scene: Scene) -> Numbers:
     return Numbers(values_of(scene), *ends, np.concatenate(rods), counts, joint_numbers(scene))
 
 
-def kernel_numbers(scene: Scene) -> Numbers:
-    """The same as kernels take them: values as a record."""
-    numbers = numbers_of(scene)
-    return numbers._replace(values=np.array([numbers.values], SCENE_NUMBERS)[0])
-
-
 # Kinds of joint, in the order of the choices.
 JOINT_KINDS = next(row.choices for row in parameter_table() if row.key == "string.rods.*.joint")
 

@@ -13,7 +13,6 @@ from percussion_model.physics.records import DRIVES, TURNS, Mode, Piston
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.numbers import Numbers
 from percussion_model.scene.rock_law import fill_rock, rock_numbers
-from percussion_model.scene.rows import SceneError
 
 # An open gap of this many transits of the slower bar ends a blow where no
 # pressure law does (docs/model.md, section 7).
@@ -42,15 +41,6 @@ class StandstillTension(IntEnum):
 
     RELEASE = 0
     PAPER = 1
-
-
-def refuse_many(name: str, count: float, most: int = MOST_CELLS, instead: str = "") -> None:
-    """Raise `SceneError` for more cells, elements or modes than can be set up."""
-    if not count <= most:
-        raise SceneError(
-            f"the bars would have {count:.3g} {name}, more than {most}: ask for fewer, or "
-            f"make the bars more alike in length{instead}"
-        )
 
 
 def kelvin_voigt_time(numbers: Numbers) -> float:

@@ -31,18 +31,6 @@ def words_of(dtype: np.dtype) -> dict[str, int]:
     return {name: int(place[1]) // 8 for name, place in (dtype.fields or {}).items()}
 
 
-def aligned_bytes(count: int) -> np.ndarray:
-    """So many bytes of zeros, from where a line of a processor's cache begins: vectors load faster.
-
-    Returns
-    -------
-    uint8 array
-    """
-    room = np.zeros(count + LINE, np.uint8)
-    start = -room.ctypes.data % LINE
-    return room[start : start + count]
-
-
 def _lines(count: int) -> int:
     """Bytes of so many, in whole lines."""
     return (count + LINE - 1) // LINE * LINE
@@ -84,10 +72,15 @@ class State:
     ) -> None:
         self.dtype, self.shapes, self.begin = dtype, shapes, begin
         size = _lines(begin + dtype.itemsize)
-        self.memory = aligned_bytes(size + sum(_lines(8 * rows * n) for rows, n in shapes))
+        for rows, columns in shapes:
+            size += _lines(8 * rows * columns)
+        # vectors load faster from the begin of a line
+        room = np.zeros(size + LINE, np.uint8)
+        there = room.ctypes.data
+        self.address = _lines(there)
+        self.memory = room[self.address - there :][:size]
         if memory is not None:
             self.memory[:] = np.frombuffer(memory, np.uint8)
-        self.address = self.memory.ctypes.data
         self.words = self.memory[begin : begin + dtype.itemsize].view(np.int64)
         self.record = np.ndarray(1, dtype, self.words)  # a view takes ten times as long
         self.numbers = self.words.view(np.float64)

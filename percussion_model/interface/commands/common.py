@@ -449,7 +449,8 @@ def needs_plot_extra(error: ImportError) -> str:
 
 def needs_extra(error: ImportError, extra: str) -> str:
     """Say which package is missing, and the extra that installs it."""
-    return f"{error.name or error} is missing: pip install 'percussion_model[{extra}]'"
+    name = error.name.partition(".")[0] if error.name else error
+    return f"{name} is missing: pip install 'percussion_model[{extra}]'"
 
 
 @contextmanager

@@ -9,7 +9,6 @@ import numpy as np
 from percussion_model.physics.kernel import kernel, preparing
 from percussion_model.scene.bars import section_mass, section_transit_time
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
-from percussion_model.solvers.modal.modes import Modes, shapes_at
 from percussion_model.solvers.modal.records import JOINED, Shape
 
 
@@ -70,49 +69,3 @@ def places_of(sections, size):
             mass[cell] = section_mass(sections[i]) / counts[i]
             cell += 1
     return counts, section, share, mass
-
-
-class Places:
-    """Cells of a bar, in whose middle force and velocity are read.
-
-    Parameters
-    ----------
-    sections : ndarray, shape (sections, 4)
-    size : float
-        Transit time of a cell, about [s].
-
-    Attributes
-    ----------
-    mass : ndarray
-        Of each cell, top to bottom [kg].
-    in_sections : list of int
-        Cells of each section.
-    """
-
-    def __init__(self, sections: np.ndarray, size: float) -> None:
-        counts, self._section, self._share, self.mass = places_of(sections, size)
-        self.in_sections = counts.tolist()
-
-    @property
-    def n(self) -> int:
-        """Number of cells."""
-        return len(self.mass)
-
-    def read(self, modes: Modes, first: int, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Elastic force [N] and velocity [m/s] of each cell.
-
-        Parameters
-        ----------
-        modes : Modes
-            Of a bar of which this one is a part.
-        first : int
-            Section of it with which this bar begins.
-        w : ndarray, shape (2 or more, modes)
-            Offsets and velocities of the modes.
-        """
-        offset, force = shapes_at(modes, first + self._section, self._share)
-        places = range(self.n)
-        return (
-            np.array([total(force, j, w, 0) for j in places]),
-            np.array([total(offset, j, w, 1) for j in places]),
-        )
