@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, simulate
-from percussion_model.engine.solvers import ModalSolver
+from percussion_model.engine.solvers import ModalSolver, WaveSolver
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.accuracy_control import planned_cells
 from percussion_model.simulation.result import Result
@@ -19,6 +19,23 @@ LONG = os.environ.get("PERCUSSION_LONG") == "1"
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 FREE = {"piston.sections.0.length": 0.287, "bit.sections.0.length": 0.411}
 WAVE_SHORT = {"run.duration": 1.4, "run.settle": 0.7}
+
+
+# ------------------------------------------------------------------------ error of a run
+
+
+def test_waves_tell_their_error_where_loss_refuses_steps_half_as_long_again():
+    """Of 7 steps 5 and 6 are refused: 4 agree by chance, but no error is below the promised one."""
+    scene = Scene().replace(**{"solver.name": "wave", "loss.time": 4e-6})
+    solver = WaveSolver(scene)
+    assert solver.cells["piston"] == 7
+    with pytest.raises(SceneError, match="too long for waves"):
+        WaveSolver(scene.replace(**{"solver.cells": 5}))
+    assert [one.solver.cells for one in solver.coarser_scenes()] == [4]
+    result = simulate(scene, record_events=False)
+    modes = simulate(scene.computed_by("modal"), record_events=False)
+    off = abs(result.rate_of_penetration - modes.rate_of_penetration)
+    assert off < result.rate_of_penetration_error < 0.1 * result.rate_of_penetration
 
 
 # ------------------------------------------------------------------------ rigid bodies

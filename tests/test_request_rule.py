@@ -26,6 +26,7 @@ from percussion_model.solvers.wave.resolution import (
     DEFAULT_STEPS,
     STEPS_OF_TWO,
     coarser_steps,
+    comparable_steps,
     error_by_steps,
     steps_for,
 )
@@ -57,6 +58,14 @@ def test_steps_are_as_many_as_they_promise():
     for steps in (2, 16, 80, 160):
         assert coarser_steps(steps) == pytest.approx(steps / COARSER, abs=0.5)
     assert coarser_steps(1) == 1
+
+
+def test_steps_to_compare_with_where_loss_refuses_some():
+    """Half as long again first, then shorter ones by a quarter, then longer, then the nearest."""
+    assert comparable_steps(24) == [16, 17, 18, 19, 15, 14, 13, 12, 20, 21, 22, 23]
+    assert comparable_steps(7) == [5, 4, 6]
+    assert comparable_steps(2) == [1]
+    assert comparable_steps(1) == []
 
 
 def test_rule_counts_the_modes_of_the_shorter_bar():
@@ -235,9 +244,10 @@ def on_grid(rate, cells=80, scatter=0.0, cycles=5.0):
     return GridRun(result, error_by_steps(cells, False))
 
 
-def test_the_error_is_that_of_the_first_order():
+@pytest.mark.parametrize("fewer", [60, 72, 80])
+def test_the_error_is_that_of_the_first_order(fewer):
     """Rates on a straight line in the step: the finer run is off by what it says."""
-    fine, coarse = (on_grid(1.0 + 0.3 / cells, cells) for cells in (90, 60))
+    fine, coarse = (on_grid(1.0 + 0.3 / cells, cells) for cells in (90, fewer))
     off = 0.3 / 90 / fine.value
     assert estimate_error(fine, [coarse]).total == pytest.approx(off, rel=1e-6)
 

@@ -154,10 +154,8 @@ class EngineSolver(Solver):
         self._entries = entries_of(self.name)
         numbers = numbers_of(scene)
         self._image = image_of(numbers)
-        facts = np.zeros(FACTS)
-        fault = self._entries.refuse(self._image.ctypes.data, facts.ctypes.data)
-        if fault:
-            raise SceneError(fault_text(fault, facts))
+        if refused := self._refusal(self._image):
+            raise SceneError(refused)
         self._motion = self._make_motion(numbers)
         self._start, self._array_shapes = self._motion.moving(), self._motion.shapes()
         self._base = int(self._motion.base)
@@ -172,7 +170,16 @@ class EngineSolver(Solver):
         self._grids: dict[str, Grid] = {}
         self._shapes: dict[tuple[str, int], np.ndarray] = {}
         self.cells = self._count_cells()
-        self._facts = facts
+        self._facts = np.zeros(FACTS)
+
+    def refusal(self, scene: Scene) -> str:
+        """Why this solver cannot be set up for another scene; empty where it can."""
+        return self._refusal(image_of(numbers_of(scene)))
+
+    def _refusal(self, image: np.ndarray) -> str:
+        facts = np.zeros(FACTS)
+        fault = self._entries.refuse(image.ctypes.data, facts.ctypes.data)
+        return fault_text(fault, facts) if fault else ""
 
     def _make_motion(self, numbers: Any) -> Motion:
         """Motion with tables of its own, or with those of one that was made before."""

@@ -20,7 +20,7 @@ from percussion_model.solvers.rigid.records import (
 )
 from percussion_model.solvers.state import State
 from percussion_model.solvers.wave.records import WAVE_LIMITS, WAVE_PAR, WAVE_STATE
-from percussion_model.solvers.wave.resolution import coarser_steps
+from percussion_model.solvers.wave.resolution import comparable_steps
 
 # Elements and contact stiffness of runs to compare with, by those of this one.
 COARSER_ELEMENTS = 0.5
@@ -73,13 +73,16 @@ class WaveSolver(EngineSolver):
         return state
 
     def coarser_scenes(self) -> list[Scene] | None:
-        """The scene with steps half as long again."""
-        first = next(iter(self.cells.values()))
-        count = coarser_steps(first)
-        if count == first:
+        """The scene with steps half as long again, or about that where loss refuses these."""
+        changes = {"solver.accuracy": None, "run.check": False}
+        scenes = [
+            self.scene.replace(**changes, **{"solver.cells": count})
+            for count in comparable_steps(next(iter(self.cells.values())))
+        ]
+        if not scenes:
             return None
-        changes = {"solver.accuracy": None, "run.check": False, "solver.cells": count}
-        return [self.scene.replace(**changes)]
+        # where all are refused, the run of the first tells why there is no error
+        return [next((scene for scene in scenes if not self.refusal(scene)), scenes[0])]
 
 
 class FemSolver(EngineSolver):

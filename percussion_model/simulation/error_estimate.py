@@ -31,7 +31,11 @@ from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.warnings import least_loss_time
 from percussion_model.solvers.modal.resolution import elastic_bars, promised_error
 from percussion_model.solvers.setup import kelvin_voigt_time
-from percussion_model.solvers.wave.resolution import error_by_pulse, error_by_steps
+from percussion_model.solvers.wave.resolution import (
+    coarser_steps,
+    error_by_pulse,
+    error_by_steps,
+)
 
 # Two aperiodic runs differ if they do by more than so many standard errors.
 CONFIDENCE = 2.0
@@ -55,6 +59,8 @@ COMPARISON_WORK = 0.12
 FEWEST_BLOWS = 10
 # Steps half as long again change half of an error of first order.
 FIRST_ORDER = 2.0
+# Steps that are not this many times as long change less of it.
+NEARLY_AS_LONG = 4.0 / 3.0
 # What brings the rate of a solver closer.
 REMEDIES = {
     "modal": "solver.accuracy (--accuracy) takes as many modes as an error needs",
@@ -89,11 +95,14 @@ class GridRun:
         Relative error of the rate that the rule of steps or modes expects; 0 where none does.
     number : tuple of float or None
         What is judged in place of the rate, and its standard error [SI].
+    floor_share : float
+        Share of what is promised that no error by waves goes below.
     """
 
     result: Result
     promised: float = 0.0
     number: tuple[float, float] | None = None
+    floor_share: float = FLOOR_SHARE
 
     @cached_property
     def _number(self) -> tuple[float, float]:
@@ -144,7 +153,7 @@ class GridRun:
         of_kinds = [numbers_over(kind) for kind in _two_kinds(blows)]
         for name, value in numbers_over(blows).items():
             number = value, scatter.get(name, math.nan)
-            found[name] = one = GridRun(self.result, self.promised, number)
+            found[name] = one = GridRun(self.result, self.promised, number, self.floor_share)
             apart = _apart(value, [numbers[name] for numbers in of_kinds])
             vars(one).update(shared, _number=number, apart=apart)
         return found
@@ -242,8 +251,15 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     others = [other for other in others if other.useful]
     if not others:
         return Estimate(math.inf, scatter, floor)  # nothing is known
-    by_grid = _by_modes(run, others) if is_modal else FIRST_ORDER * _difference(others[-1], run)
+    by_grid = _by_modes(run, others) if is_modal else _by_steps(run, others[-1])
     return Estimate(by_grid, scatter, floor)
+
+
+def _by_steps(run: GridRun, other: GridRun) -> float:
+    """Error by the steps: what is left of one of first order, by a run with longer ones."""
+    longer = _resolution(run.result) / _resolution(other.result)
+    left = 1.0 / (longer - 1.0) if 1.0 < longer < NEARLY_AS_LONG else FIRST_ORDER
+    return left * _difference(other, run)
 
 
 def _by_modes(run: GridRun, others: Sequence[GridRun]) -> float:
@@ -322,6 +338,8 @@ def with_error_estimate(
     short = {"run.duration": end, "run.settle": settle}
     early = result.blows["time"] + result.blows["period"] <= end
     part = grid_run(replace(result, settle=settle, blows=result.blows[early]))
+    if _has_makeshift(result, coarser):
+        part = replace(part, floor_share=1.0)
     try:
         others = [grid_run(run(scene.replace(**short))) for scene in coarser]
         decided = [
@@ -334,6 +352,14 @@ def with_error_estimate(
         result.warnings.append("interrupted while the errors of the means were estimated")
         return result
     return _judged(whole, part, others, decided)
+
+
+def _has_makeshift(result: Result, coarser: Sequence[Scene]) -> bool:
+    """Whether loss refuses the steps to compare with: near there others agree by chance."""
+    if result.solver != "wave":
+        return False
+    usual = coarser_steps(_resolution(result))
+    return any(scene.solver.cells != usual for scene in coarser)
 
 
 def otherwise_decided(run: GridRun, others: Sequence[GridRun]) -> list[Scene]:
@@ -409,14 +435,13 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
         return estimate_error(part, others)
     known = [other for other in others if other.useful]
     # each of the others is coarser in another way
-    off = sum(_difference(other, part) for other in known) if known else math.inf
-    if part.result.solver == "wave":
-        off *= FIRST_ORDER
+    apart = _by_steps if part.result.solver == "wave" else _difference
+    off = sum(apart(part, other) for other in known) if known else math.inf
     same = all(_same_motion(part, other) for other in known)
     share = NUMERICAL_SHARE if same else NUMERICAL_SHARE_OF_MOTIONS
     floor = share * abs(part.result.energy["numerical_relative"])
     # the ledger has no share where only a wave from outside gave energy
-    return Estimate(off, scatter, max(FLOOR_SHARE * part.promised, _by_pulse(part), floor))
+    return Estimate(off, scatter, max(part.floor_share * part.promised, _by_pulse(part), floor))
 
 
 def _by_pulse(run: GridRun) -> float:

@@ -53,6 +53,8 @@ def show_motion(par, s, waves, row, time):
         s.v_p += waves.bars[BY_LOSS, 0]
     casing = s.u_c if par.damper == 1 else waves.bars[POSITION, par.struck]
     fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, here)
+    if par.piston != Piston.ABSENT:  # what a closure between two grid points leaves is no gap
+        row.gap = 0.0 if s.closed == 1 else max(s.gap, 0.0)
 
 
 @merged

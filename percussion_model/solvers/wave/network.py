@@ -310,7 +310,7 @@ def network_of(numbers, plan):
     ring, used, misfit, k, too_fine = 0, 0, 0.0, 0, 0.0
     passage, passed, lossy_ends = np.zeros((1, 64)), 0, 1
     for bar in range(bars):
-        begin, spread, all_wanted = k, 0.0, 0.0
+        begin, spread, all_wanted, late = k, 0.0, 0.0, 0.0
         for _ in range(plan.counts[bar]):
             section = plan.sections[k]
             transit = section_transit_time(section) / dt
@@ -337,9 +337,11 @@ def network_of(numbers, plan):
                 k == begin,
             )  # fmt: skip
             bodies[bar, Body.MASS] += mass
+            late += 0.5 * z * cut.spread * dt * dt
             k += 1
         bodies[bar, Body.FIRST], bodies[bar, Body.LAST] = begin, k - 1
         bodies[bar, Body.INV_MASS] = 1.0 / bodies[bar, Body.MASS]
+        bodies[bar, Body.LATE] = late / bodies[bar, Body.MASS]
         if spread < LEAST_OF_ENDS * all_wanted:
             lossy_ends = 0
             if eta > MOST_WITHOUT_ENDS * dt and too_fine == 0.0:

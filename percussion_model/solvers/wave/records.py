@@ -93,6 +93,7 @@ class Body(IntEnum):
     FIRST = 1  # section
     LAST = 2
     INV_MASS = 3  # 1 / mass [1/kg]
+    LATE = 4  # half the spread of waves by their time: so late the mean follows an end [s]
 
 
 class Task(IntEnum):

@@ -19,6 +19,8 @@ STEPS_OF_TWO, ERROR_OF_TWO = 24, 1e-2
 PULSE_STEPS, ERROR_OF_A_STEP = 192, 0.7
 # A run is compared with one whose steps are so many times as long.
 COARSER = 1.5
+# Where loss refuses those: with steps this many times as long, or else up to this many.
+LEAST_COARSER, MOST_COARSER = 1.25, 2.0
 
 
 def steps_for(accuracy: float, is_string: bool) -> int:
@@ -43,3 +45,19 @@ def error_by_pulse(steps: float) -> float:
 def coarser_steps(steps: int) -> int:
     """Steps of the run that a run is compared with."""
     return max(1, round(steps / COARSER))
+
+
+def comparable_steps(steps: int) -> list[int]:
+    """Steps of runs that a run may be compared with, the best first; none for a single step.
+
+    The coarsest that is not coarser than `coarser_steps` and differs by a quarter, then coarser
+    ones, the nearest first, then those that differ by less.
+    """
+    wanted = coarser_steps(steps)
+    near = max(wanted, math.floor(steps / LEAST_COARSER))
+    counts = [
+        *range(wanted, near + 1),
+        *range(wanted - 1, math.ceil(steps / MOST_COARSER) - 1, -1),
+        *range(near + 1, steps),
+    ]
+    return [count for count in counts if 0 < count < steps]

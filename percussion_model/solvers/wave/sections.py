@@ -11,7 +11,7 @@ from percussion_model.solvers.wave.taps import width_of
 
 BAR, RING, SIZE, DELAY, TAPS, WEIGHTS, CELLS, PASSAGE, REACH = (int(row) for row in Place)
 IMPEDANCE, ALPHA, BETA, CELL_MASS, BY_LOSS, BY_MIXING = (int(row) for row in Steel)
-MASS, FIRST, LAST, INV_MASS = (int(row) for row in Body)
+MASS, FIRST, LAST, INV_MASS, LATE = (int(row) for row in Body)
 GIVEN = int(Bar.GIVEN)
 # Rows of `Waves.came`: what arrives at the lower and the upper end of a section, what leaves
 # these, and the impulses on the upper and the lower end of a bar and its acceleration.

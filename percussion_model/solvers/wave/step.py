@@ -37,6 +37,7 @@ from percussion_model.solvers.wave.sections import (
     IMPEDANCE,
     INV_MASS,
     LAST,
+    LATE,
     MASS,
     UP,
     UP_OUT,
@@ -283,7 +284,8 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
 
     A closure in the first half of a step counts for waves from its start, one in the second from
     its end: so fronts stay sharp, of which averaging over the step would take a part, and come
-    early as often as late.
+    early as often as late. What the ends then are apart, or overlap, stays as `gap` till they have
+    opened: else each blow would move the piston against its mean, by which the drive turns.
     """
     came, struck = waves.came, par.struck
     k = int(chain.bodies[struck, FIRST])
@@ -296,9 +298,10 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
     touches = s.closed == 1
     if s.closed == 0:
         if approach > REST_APPROACH and s.gap < approach * tau:
-            t_close = s.gap / approach
+            t_close = max(s.gap / approach, 0.0)
             s.closed, touches = 1, t_close < 0.5 * tau
-        s.gap = 0.0 if s.closed == 1 else max(s.gap - approach * tau, 0.0)
+        if not touches:
+            s.gap -= approach * tau
     impulse, force, more = 0.0, before + approach / yields, 1.0 + par.viscous
     if touches and elastic:
         impulse = approach / yields * more * tau
@@ -364,15 +367,16 @@ def meet_nothing(par, s, chain, waves, tau):
 def velocity_by_loss(par, s, chain, waves, i):
     """Mean velocity of a bar below the piston by the impulses of loss at its ends [m/s].
 
-    They are eta/2 of the forces by waves. Without them momentum that an end gives a bar would
-    move its mean by v eta/2 less than its ends.
+    They are eta/2 of the forces by waves, or as much less as its sections spread waves less.
+    Without them momentum that an end gives a bar would move its mean by v eta/2 less than its
+    ends, what body forces give would not: with each blow ends and mean would drift apart.
     """
     joints, j, above, below = waves.joints, i - par.struck, s.g_contact, s.g_rock
     if j > 0:
         above = joints[BY_WAVES, j - 1]
     if i < par.bars - 1:
         below = joints[BY_WAVES, j]
-    return par.viscous * par.dt * (above - below) * chain.bodies[i, INV_MASS]
+    return chain.bodies[i, LATE] * (above - below) * chain.bodies[i, INV_MASS]
 
 
 @inlined
@@ -463,7 +467,7 @@ def meet(par, s, chain, waves, tau, blows, events):
         a_p, more = piston_acceleration(par, push), 0.0
         if par.piston == Piston.ELASTIC:
             impulse = waves.came[FROM_ABOVE, par.struck]
-            by_loss = -par.viscous * par.dt * s.g_contact / par.mass_p
+            by_loss = -chain.bodies[0, LATE] * s.g_contact / par.mass_p
             more = half * (bars[BY_LOSS, 0] + by_loss)
             bars[BY_LOSS, 0] = by_loss
             s.e_loss += par.mass_p * a_p * more
