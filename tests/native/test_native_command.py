@@ -113,7 +113,7 @@ def linked(monkeypatch):
         out.write_bytes(b"library")
 
     monkeypatch.setattr(native, "compiler_for", lambda name, word: ["cc"])
-    monkeypatch.setattr(native, "objects", lambda _, names, report: {one: [] for one in names})
+    monkeypatch.setattr(native, "objects", lambda _, names, report=None: {one: [] for one in names})
     monkeypatch.setattr(native, "link", link)
     return names
 

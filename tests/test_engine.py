@@ -1,0 +1,112 @@
+"""Entries of the solvers: their form, their sources, threads, and what of numba is relied on."""
+
+import inspect
+import sys
+import threading
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from percussion_model import Scene, Simulation
+from percussion_model.engine import compiler
+from percussion_model.engine.entries import ENTRIES, SOLVERS
+from percussion_model.engine.fault_texts import fault_text
+from percussion_model.engine.faults import Fault
+from percussion_model.engine.library import module_of
+from percussion_model.engine.platforms import this_platform
+from percussion_model.physics.records import SAMPLE_FIELDS
+
+THREADS = 6
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_each_solver_has_every_entry_with_its_arguments(solver):
+    module = import_module(module_of(solver))
+    for name, form in ENTRIES.items():
+        taken = inspect.signature(getattr(module, name).py_func).parameters
+        assert len(taken) == len(form.partition(":")[2]), name
+
+
+def test_an_edit_concerns_the_solvers_that_import_what_was_edited():
+    def made_of(solver):
+        return {file.relative_to(compiler.PACKAGE).as_posix()
+                for file in compiler.sources_of(module_of(solver))}  # fmt: skip
+
+    found = {solver: made_of(solver) for solver in SOLVERS}
+    shared = ("physics/rock.py", "physics/kernel.py", "engine/layout.py", "scene/bars.py",
+              "components/__init__.py")  # fmt: skip
+    for solver in SOLVERS:
+        assert found[solver] >= {*shared, f"solvers/{solver}/advance.py"}
+        others = {f"solvers/{one}/advance.py" for one in SOLVERS if one != solver}
+        assert not found[solver] & others
+        assert not any(name.startswith(("interface/", "analysis/")) for name in found[solver])
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_threads_do_not_disturb_each_other(solver):
+    """Each with a simulation of its own, all with one solver, and so with one room to work in."""
+    scene = Scene().computed_by(solver)
+    one = Simulation(scene)
+    times = np.linspace(0.01, 0.05, 200)
+    wanted, found = one.sample_rows(times), {}
+
+    def work(k):
+        found[k] = Simulation(scene, solver=one.solver).sample_rows(times)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(THREADS)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == THREADS
+    for rows in found.values():
+        np.testing.assert_array_equal(rows, wanted)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_samples_are_what_readings_tell(solver):
+    scene, times = Scene().computed_by(solver), np.linspace(0.0, 0.04, 90)
+    rows, read = Simulation(scene).sample_rows(times), Simulation(scene)
+    for row, t in zip(rows, times, strict=True):
+        read.advance(float(t))
+        seen = read.observe()
+        np.testing.assert_array_equal(row, [seen[name] for name in SAMPLE_FIELDS])
+
+
+def test_facts_stand_in_the_texts_of_faults():
+    text = fault_text(Fault.BEHIND, (0.1, 2.5, 0.0, 0.0))
+    assert text == "the saved state has its time of 0.1 s, far before 2.5 s"
+    assert fault_text(Fault.MODES, (1234.5, 10.0)).startswith(
+        "the bars would have 1.23e+03 modes, more than 10: "
+    )
+
+
+def test_what_is_used_of_numba_and_llvm_is_there(tmp_path, monkeypatch):
+    """With a release of them that fails here, mend `engine/objects.py` and `engine/loading.py`."""
+    from percussion_model.engine.loading import load_objects
+    from percussion_model.engine.objects import compile_entries, exported_by, undefined
+
+    (tmp_path / "small_entries.py").write_text(
+        "import numpy as np\n"
+        "from percussion_model.engine.memory import floats_at\n"
+        "from percussion_model.physics.kernel import preparing\n"
+        "EXPORTED = {'small_sum': ('add_up', 'n:ww')}\n"
+        "@preparing\n"
+        "def add_up(address, count):\n"
+        "    room = np.zeros(count)\n"
+        "    room[:] = floats_at(address, count)\n"
+        "    return room.sum()\n"
+    )
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    platform, text = this_platform(), compile_entries(exported_by("small_entries"))
+    assert "small_sum" in text
+    assert callable(undefined)
+    made = compiler.objects_of("small_entries", text, ["small_sum"], platform, tmp_path)
+    address_of, suffix, _ = load_objects(made)
+    import ctypes
+
+    call = ctypes.PYFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
+    numbers = np.arange(5.0)
+    add_up = call(address_of(f"small_sum{suffix}"))
+    assert add_up(numbers.ctypes.data, len(numbers)) == 10.0
