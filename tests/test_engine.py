@@ -1,6 +1,9 @@
 """Entries of the solvers: their form, their sources, threads, and what of numba is relied on."""
 
+import copy
+import ctypes
 import inspect
+import pickle
 import sys
 import threading
 from importlib import import_module
@@ -74,6 +77,18 @@ def test_samples_are_what_readings_tell(solver):
         np.testing.assert_array_equal(row, [seen[name] for name in SAMPLE_FIELDS])
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_copies_of_a_simulation_go_on_alone(solver):
+    one = Simulation(Scene().computed_by(solver))
+    one.advance(0.01)
+    copies = copy.deepcopy(one), pickle.loads(pickle.dumps(one))
+    one.advance(0.05)
+    for other in copies:
+        assert other.time == 0.01
+        other.advance(0.05)
+        assert other.observe() == one.observe()
+
+
 def test_facts_stand_in_the_texts_of_faults():
     text = fault_text(Fault.BEHIND, (0.1, 2.5, 0.0, 0.0))
     assert text == "the saved state has its time of 0.1 s, far before 2.5 s"
@@ -85,7 +100,7 @@ def test_facts_stand_in_the_texts_of_faults():
 def test_what_is_used_of_numba_and_llvm_is_there(tmp_path, monkeypatch):
     """With a release of them that fails here, mend `engine/objects.py` and `engine/loading.py`."""
     from percussion_model.engine.loading import load_objects
-    from percussion_model.engine.objects import compile_entries, exported_by, undefined
+    from percussion_model.engine.objects import compile_entries, exported_by, write_objects
 
     (tmp_path / "small_entries.py").write_text(
         "import numpy as np\n"
@@ -99,13 +114,9 @@ def test_what_is_used_of_numba_and_llvm_is_there(tmp_path, monkeypatch):
         "    return room.sum()\n"
     )
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    platform, text = this_platform(), compile_entries(exported_by("small_entries"))
-    assert "small_sum" in text
-    assert callable(undefined)
-    made = compiler.objects_of("small_entries", text, ["small_sum"], platform, tmp_path)
+    text = compile_entries(exported_by("small_entries"))
+    made = write_objects(text, ["small_sum"], this_platform(), tmp_path)
     address_of, suffix, _ = load_objects(made)
-    import ctypes
-
     call = ctypes.PYFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
     numbers = np.arange(5.0)
     add_up = call(address_of(f"small_sum{suffix}"))

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import carray, from_dtype, types
+from numba import carray, from_dtype, literal_unroll, types
 from numba.extending import intrinsic
 
 from percussion_model.physics.kernel import compiled
+
+__all__ = ["literal_unroll"]
 
 # As `preparing`, but part of the caller: views of memory are cheap only there.
 viewing = compiled(error_model="numpy", forceinline=True)

@@ -47,9 +47,12 @@ def brought_file(solver: str, platform: str) -> Path:
 def _library_file(solver: str) -> Path:
     """File of the library of a solver, which need not be there."""
     brought = brought_file(solver, this_platform())
+    if brought.is_file():
+        return brought
     places = [folder / "libraries" / brought.name for folder in compiler.kept_folders()]
-    found = next((one for one in (brought, *places) if one.is_file()), None)
-    return found or compiler.kept_folder() / "libraries" / brought.name
+    return next((one for one in places if one.is_file()), None) or (
+        compiler.kept_folder() / "libraries" / brought.name
+    )
 
 
 def place_to_compile(solver: str) -> Path | None:
@@ -116,12 +119,17 @@ def link_solver(solver: str, platform: str, command: Sequence[str], file: Path) 
     compiler.link(platform, command, [source], parts, file, flags)
 
 
+# Entries that are over at once; others let threads of Python run meanwhile.
+QUICK = {"state_time", "grid_point_after", "readable_until", "is_quiet", "time_of_blow"}
+
+
 def _functions(solver: str, suffix: str, address_of: Callable[[str], int]) -> SimpleNamespace:
-    """Entries at addresses, which keep the interpreter's lock: a motion has room for one call."""
+    """Entries at addresses."""
     found = SimpleNamespace()
     for name, form in ENTRIES.items():
         result, _, arguments = form.partition(":")
-        kind = ctypes.PYFUNCTYPE(_KINDS[result], *(_KINDS[one] for one in arguments))
+        prototype = ctypes.PYFUNCTYPE if name in QUICK else ctypes.CFUNCTYPE
+        kind = prototype(_KINDS[result], *(_KINDS[one] for one in arguments))
         setattr(found, name, kind(address_of(f"{solver}_{name}{suffix}")))
     return found
 

@@ -6,8 +6,6 @@ of its rows stand the offset [bytes] and up to four dimensions.
 
 from __future__ import annotations
 
-from numba import literal_unroll
-
 from percussion_model.engine.records import LINE
 from percussion_model.physics.kernel import DISABLED, preparing
 
@@ -16,6 +14,7 @@ if DISABLED:
         allocate,
         copy_to,
         floats_in,
+        literal_unroll,
         merging,
         new_record,
         records_at,
@@ -27,6 +26,7 @@ else:
         allocate,
         copy_to,
         floats_in,
+        literal_unroll,
         merging,
         new_record,
         records_at,

@@ -327,16 +327,31 @@ BUILDS = {
 }
 
 
+def write_objects(text: str, names: Iterable[str], platform: str, folder: Path) -> list[Path]:
+    """Write the objects of a module for a platform, `<platform>_<build>.o`, into a folder.
+
+    Parameters
+    ----------
+    text : str
+        As `compile_entries` gives it.
+    names : iterable of str
+        Entries.
+    """
+    files = []
+    for cpu, features, suffix in BUILDS[platform.partition("-")[0]]:
+        target = Target(PLATFORMS[platform].triple, cpu, features, suffix)
+        files.append(folder / f"{platform}{suffix}.o")
+        files[-1].write_bytes(make_object(text, target, names))
+    return files
+
+
 def main(module: str, folder: str, *platforms: str) -> None:
-    """Write the objects of a module's entries, `<platform>_<build>.o`, into a folder."""
+    """Write the objects of a module's entries for platforms into a folder."""
     gc.disable()  # it would take a tenth of the time, and find nothing
     entries = exported_by(module)
     text = compile_entries(entries)
     for platform in platforms:
-        for cpu, features, suffix in BUILDS[platform.partition("-")[0]]:
-            target = Target(PLATFORMS[platform].triple, cpu, features, suffix)
-            file = Path(folder) / f"{platform}{suffix}.o"
-            file.write_bytes(make_object(text, target, entries))
+        write_objects(text, entries, platform, Path(folder))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,11 @@ def viewing(function: Callable) -> Callable:
 merging = viewing
 
 
+def literal_unroll(arrays: Any) -> Any:
+    """Arrays of a tuple, one after the other."""
+    return arrays
+
+
 def allocate(size: int) -> int:
     """Memory of zeros, which begins at a line; its address."""
     whole = (ctypes.c_char * (size + LINE))()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import threading
 import weakref
 from typing import Any, ClassVar, NamedTuple
 
@@ -23,7 +24,7 @@ from percussion_model.engine.records import (
     GaugeBar,
 )
 from percussion_model.engine.scene_image import image_of
-from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
+from percussion_model.physics.records import READING, Status
 from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.numbers import numbers_of
@@ -152,6 +153,10 @@ class EngineSolver(Solver):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._entries = entries_of(self.name)
+        self._lock = threading.Lock()  # a motion has room for one call at a time
+        self._blows: np.ndarray | None = None
+        self._events: np.ndarray | None = None
+        self._blows_at = self._events_at = 0
         numbers = numbers_of(scene)
         self._image = image_of(numbers)
         if refused := self._refusal(self._image):
@@ -171,6 +176,14 @@ class EngineSolver(Solver):
         self._shapes: dict[tuple[str, int], np.ndarray] = {}
         self.cells = self._count_cells()
         self._facts = np.zeros(FACTS)
+        # what `sample` works in
+        self._spare = State(self.STATE, self._array_shapes, RECORD)
+        self._seen, self._done = np.zeros(1, READING), np.zeros(1, np.int64)
+        self._seen_at, self._done_at = self._seen.ctypes.data, self._done.ctypes.data
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is made anew of the scene: a motion lies in memory of its own."""
+        return type(self), (self.scene,)
 
     def refusal(self, scene: Scene) -> str:
         """Why this solver cannot be set up for another scene; empty where it can."""
@@ -252,14 +265,23 @@ class EngineSolver(Solver):
 
     # motion
 
+    def _take_rooms(self, blows: np.ndarray, events: np.ndarray) -> None:
+        # callers have the same ones again, and to ask for an address takes a microsecond
+        if self._blows is not blows:
+            self._blows, self._blows_at = blows, blows.ctypes.data
+        if self._events is not events:
+            self._events, self._events_at = events, events.ctypes.data
+
     def _run(
         self, task: int, state: State, t: float, blows: np.ndarray, events: np.ndarray,
         record_events: bool,
     ) -> tuple[int, int, int]:  # fmt: skip
-        status = self._entries.run(
-            self._base, state.address, task, t, blows.ctypes.data, len(blows),
-            events.ctypes.data, len(events), record_events,
-        )  # fmt: skip
+        with self._lock:
+            self._take_rooms(blows, events)
+            status = self._entries.run(
+                self._base, state.address, task, t, self._blows_at, len(blows),
+                self._events_at, len(events), record_events,
+            )  # fmt: skip
         words = state.words
         return status, int(words[self._blow_word]), int(words[self._event_word])
 
@@ -282,9 +304,10 @@ class EngineSolver(Solver):
     ) -> State:  # fmt: skip
         """Evaluate at `t`; a copy at the last grid point up to it. As in `Solver`."""
         copy = spare if spare is not None else State(self.STATE, state.shapes, RECORD)
-        status = self._entries.read(
-            self._base, state.address, copy.address, t, reading.ctypes.data, peaks
-        )
+        with self._lock:
+            status = self._entries.read(
+                self._base, state.address, copy.address, t, reading.ctypes.data, peaks
+            )
         if status != Status.DONE:
             raise RuntimeError(f"the {self.name} solver stopped: {Status(status).name}")
         return copy
@@ -299,7 +322,7 @@ class EngineSolver(Solver):
 
     def sample(self, state: State, times: np.ndarray, out: np.ndarray) -> None:
         """Evaluate at `times` into rows of `SAMPLE_FIELDS`."""
-        self._sample(state, times, out, np.zeros(1, BLOW), np.zeros(1, EVENT), False, False)
+        self._sample(state, times, out, self._no_blows, self._no_events, False, False)
 
     def sample_ahead(
         self, state: State, times: np.ndarray, out: np.ndarray, blows: np.ndarray,
@@ -312,20 +335,19 @@ class EngineSolver(Solver):
         self, state: State, times: np.ndarray, out: np.ndarray, blows: np.ndarray,
         events: np.ndarray, record_events: bool, advances: bool,
     ) -> tuple[int, int, int, int]:  # fmt: skip
-        times, done = np.ascontiguousarray(times, np.float64), np.zeros(1, np.int64)
-        rows = out
-        if not out.flags.c_contiguous:
-            rows = np.zeros((len(times), len(SAMPLE_FIELDS)))
-        copy, reading = State(self.STATE, state.shapes, RECORD), np.zeros(1, READING)
-        status = self._entries.sample(
-            self._base, state.address, copy.address, advances, times.ctypes.data, len(times),
-            reading.ctypes.data, rows.ctypes.data, blows.ctypes.data, len(blows),
-            events.ctypes.data, len(events), record_events, done.ctypes.data,
-        )  # fmt: skip
+        times, rows = np.ascontiguousarray(times, np.float64), np.ascontiguousarray(out)
+        with self._lock:
+            self._take_rooms(blows, events)
+            status = self._entries.sample(
+                self._base, state.address, self._spare.address, advances, times.ctypes.data,
+                len(times), self._seen_at, rows.ctypes.data, self._blows_at, len(blows),
+                self._events_at, len(events), record_events, self._done_at,
+            )  # fmt: skip
+            count = int(self._done[0])
         if rows is not out:
             out[:] = rows
         words = state.words
-        return status, int(words[self._blow_word]), int(words[self._event_word]), int(done[0])
+        return status, int(words[self._blow_word]), int(words[self._event_word]), count
 
     # fields
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged, scalar
 
 # Below this share of the reference penetration, or of the force there, the power law goes on as
 # a straight line: nothing that moves a bit is so small.
@@ -178,7 +178,7 @@ def part_at(par, k, force):
     return par.reference_penetration * exp(log(relative) / par.exponent)
 
 
-@kernel
+@scalar
 def secant_stiffness(force, stiffness, exponent, reference_penetration):
     """Force of rock by the penetration that loads it, at a force [N/m].
 

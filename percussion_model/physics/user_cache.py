@@ -60,7 +60,7 @@ def _temporary(reason: str) -> Path:
     if not _is_private(folder):
         folder = Path(tempfile.mkdtemp(prefix=f"{NAME}-"))
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    _log.warning("%s: kernels are kept in %s; %s changes that", reason, folder, VARIABLE)
+    _log.warning("%s: what is compiled is kept in %s; %s changes that", reason, folder, VARIABLE)
     return folder
 
 
