@@ -32,7 +32,7 @@ ENTRIES = {
     "time_of_blow": "n:ww",
     # base, moving, task, time, blows, room, events, room, whether events are listed -> Status
     "run": "w:wwwnwwwww",
-    # base, moving, copy, time, reading, whether peaks are wanted -> Status
+    # base, moving, copy, time, reading, 1: with peaks, 0: without, -1: a sample alone -> Status
     "read": "w:wwwnww",
     # base, moving, copy, whether to advance, times, count, reading, rows, blows, room, events,
     # room, whether events are listed, count of rows -> Status

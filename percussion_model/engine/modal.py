@@ -361,7 +361,7 @@ def read(base, moving, copy, t, reading, peaks):
     count = (head_records(base, 1)[0].state_bytes - RECORD) // 8
     copy_words(moving + RECORD, copy + RECORD, count)
     state = state_in(copy)
-    if not peaks:
+    if peaks < 1:
         state[0].peak_from = math.inf
     return run_task(
         Task.READ.value, parameters(base), state, bars_in(base, copy), t, blow_rows(base),

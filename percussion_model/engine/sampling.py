@@ -11,6 +11,8 @@ from percussion_model.physics.kernel import composed
 from percussion_model.physics.records import SAMPLE_FIELDS, Status
 
 WIDTH = len(SAMPLE_FIELDS)
+# In place of whether peaks are wanted: nor is the ledger.
+SAMPLE_ALONE = -1
 
 
 def sampler(run: Any, read: Any, state_time: Any, time_of_blow: Any) -> Any:
@@ -41,7 +43,8 @@ def sampler(run: Any, read: Any, state_time: Any, time_of_blow: Any) -> Any:
                 if k > 0 and time_of_blow(base, moving) > t:  # it is looked for between two calls
                     break
                 listed = words[head.blow_count_at] + words[head.event_count_at]
-            status = read(base, moving, copy, max(t, state_time(base, moving)), reading, 0)
+            t = max(t, state_time(base, moving))
+            status = read(base, moving, copy, t, reading, SAMPLE_ALONE)
             if status != Status.DONE:
                 return status
             for i in range(WIDTH):

@@ -221,10 +221,11 @@ def read(base, moving, copy, t, reading, peaks):
     count = (directory(base)[RINGS, 0] - RECORD) // 8
     copy_words(moving + RECORD, copy + RECORD, count)
     state = state_in(copy)
-    if not peaks:
+    if peaks < 1:
         state[0].peak_from = math.inf
+    task = Task.READ.value if peaks >= 0 else Task.SAMPLE.value
     return run_task(
-        Task.READ.value, parameters(base), state, chain_of(base), waves_in(base, moving, copy), t,
+        task, parameters(base), state, chain_of(base), waves_in(base, moving, copy), t,
         blow_rows(base), event_rows(base), reading_records(reading, 1),
     )  # fmt: skip
 

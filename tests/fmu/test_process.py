@@ -78,7 +78,11 @@ def test_with_a_library_neither_numpy_nor_numba_nor_a_cache_is_needed(fmus, tmp_
 
 
 def test_without_a_library_and_without_numba_the_reason_is_told(fmus, tmp_path):
-    done = host(fmus / "NumbaRigidHammer.fmu", tmp_path, absent=f"{ABSENT},numba")
+    cache = str(tmp_path / "cache")  # of its own, with nothing compiled
+    done = host(
+        fmus / "NumbaRigidHammer.fmu", tmp_path, absent=f"{ABSENT},numba",
+        PERCUSSION_FMU_CACHE=cache,
+    )  # fmt: skip
     assert done.returncode != 0
     assert "no library for" in done.stderr
     assert "install numba" in done.stdout

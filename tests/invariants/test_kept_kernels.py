@@ -117,7 +117,7 @@ def test_a_read_only_installation_and_home_keep_kernels_with_temporary_files(clo
     kept = []
     for _ in range(2):
         (line,) = run(closed, TMPDIR=str(temporary))
-        assert "cannot be written: kernels are kept in" in line
+        assert "cannot be written: what is compiled is kept in" in line
         kernels = temporary.rglob("*.nb[ci]")
         kept.append({path: path.stat().st_mtime_ns for path in kernels})
     assert kept[0]

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from percussion_model.physics.blows import end_of_step_with_blow
-from percussion_model.physics.kernel import kernel, merged
+from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.readings import fill_forces, fill_ledger, fill_motion
 from percussion_model.physics.records import Piston, Status
 from percussion_model.physics.reference import refer
@@ -15,13 +13,13 @@ from percussion_model.physics.rock import recoverable
 from percussion_model.solvers.wave.records import Task
 from percussion_model.solvers.wave.sections import (
     DOWN,
+    LATE,
     UP_OUT,
     kinetic_of_bar,
     under_way,
 )
 from percussion_model.solvers.wave.step import BY_LOSS, POSITION, step, time_of
 
-ADVANCE, _, SAMPLE = (int(task) for task in Task)
 # Events that one step can make besides the rock's crossings: contact and drive.
 OTHER_EVENTS = 4
 # A time this close below a grid point is that grid point, and the shortest that is read [steps].
@@ -43,14 +41,24 @@ def stored(par, s, chain, waves):
     return kinetic, elastic
 
 
+@inlined
+def momentum_by_loss(par, chain, waves, i):
+    """Momentum of a bar beside its waves, by its mass [m/s].
+
+    The impulses at lossy ends tell of eta/2; the mean follows by what the sections have of that.
+    """
+    late = chain.bodies[i, LATE]
+    return waves.bars[BY_LOSS, i] * (par.viscous * par.dt / late) if late > 0.0 else 0.0
+
+
 @merged
-def show_motion(par, s, waves, row, time):
+def show_motion(par, s, chain, waves, row, time):
     """Fill in the motion, with what loss gives beside the waves."""
     bit = par.bars - 1
     here = waves.bars[POSITION, bit]
-    s.v_b += waves.bars[BY_LOSS, bit]
+    s.v_b += momentum_by_loss(par, chain, waves, bit)
     if par.piston == Piston.ELASTIC:
-        s.v_p += waves.bars[BY_LOSS, 0]
+        s.v_p += momentum_by_loss(par, chain, waves, 0)
     casing = s.u_c if par.damper == 1 else waves.bars[POSITION, par.struck]
     fill_motion(par, s, row, time, s.u_r - s.u_0 + casing, here)
     if par.piston != Piston.ABSENT:  # what a closure between two grid points leaves is no gap
@@ -70,12 +78,12 @@ def read_at(par, s, chain, waves, time, blows, events, row, with_ledger):
     s.i_contact = 0.0
     at_grid_point = time - time_of(par, s) <= SHORTEST * par.dt
     if at_grid_point:  # nothing has moved in that instant
-        show_motion(par, s, waves, row, time)
+        show_motion(par, s, chain, waves, row, time)
     step(par, s, chain, waves, tau, blows, events)
     if at_grid_point:
         row.drilling_mode = s.mode
     else:
-        show_motion(par, s, waves, row, time)
+        show_motion(par, s, chain, waves, row, time)
     k = par.sections - 1
     row.bit_end_velocity = waves.came[DOWN, k] + waves.came[UP_OUT, k]
     fill_forces(s, row, tau, bit, contact, at_grid_point)
@@ -132,52 +140,3 @@ def run(task, par_, state, chain_, waves_, time, blows, events, reading):
             return Status.NOT_FINITE
         step(par, s, chain, waves, par.dt, blows, events)
     return Status.DONE
-
-
-@kernel
-def sample(par_, state, chain, waves, memory, spare, spare_waves, spare_memory, times, blows,
-           events, reading, row, out):  # fmt: skip
-    """Advance through rising times and read at each, as `run` does it call by call.
-
-    Parameters
-    ----------
-    par_, state, chain, waves, blows, events : as for `run`
-    memory : (int64 array, float64 array)
-        All of the state: the words of its record, and its arrays.
-    spare, spare_waves, spare_memory : as state, waves, memory
-        Of a copy that readings may spoil, with the rings of the state, which they leave alone.
-    times : float64 array
-        [s]
-    reading : READING array of length 1
-    row : float64 array
-        Its beginning, of which each row of `out` is a copy.
-    out : float64 array, shape (times, numbers of a row)
-
-    Returns
-    -------
-    status : int
-        Of the last advance, a `Status`.
-    count : int
-        Times that were read: fewer than all where blows or events were listed, or a blow may start.
-    """
-    # as numbers of a type that `run` has been compiled for, not as constants of their own
-    advance, read = np.int64(ADVANCE), np.int64(SAMPLE)
-    for k in range(len(times)):
-        status = run(advance, par_, state, chain, waves, times[k], blows, events, reading)
-        if status != Status.DONE:
-            return status, k
-        if k > 0 and time_of_blow(par_, state) > times[k]:  # it is looked for between two calls
-            return Status.DONE, k
-        listed = state[0].n_blows + state[0].n_events
-        for i in range(len(memory[0])):
-            spare_memory[0][i] = memory[0][i]
-        for i in range(len(spare_memory[1])):
-            spare_memory[1][i] = memory[1][i]
-        spare[0].peak_from = math.inf  # nobody asks here for peaks
-        here = max(times[k], time_of(par_[0], state[0]))
-        run(read, par_, spare, chain, spare_waves, here, blows, events, reading)
-        for i in range(out.shape[1]):
-            out[k, i] = row[i]
-        if listed:
-            return status, k + 1
-    return Status.DONE, len(times)
