@@ -7,6 +7,7 @@ import pickle
 import sys
 import threading
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from percussion_model.engine import compiler
 from percussion_model.engine.entries import ENTRIES, SOLVERS
 from percussion_model.engine.fault_texts import fault_text
 from percussion_model.engine.faults import Fault
-from percussion_model.engine.library import module_of
+from percussion_model.engine.library import _exports, module_of
 from percussion_model.engine.platforms import this_platform
 from percussion_model.physics.records import SAMPLE_FIELDS
 
@@ -121,3 +122,10 @@ def test_what_is_used_of_numba_and_llvm_is_there(tmp_path, monkeypatch):
     numbers = np.arange(5.0)
     add_up = call(address_of(f"small_sum{suffix}"))
     assert add_up(numbers.ctypes.data, len(numbers)) == 10.0
+
+
+def test_libraries_for_windows_name_what_they_export():
+    text = _exports("rigid", [Path("x86_64-windows_base.o"), Path("x86_64-windows_avx2.o")])
+    assert text.count("-export:") == 2 * len(ENTRIES)
+    assert " -export:rigid_create_avx2" in text
+    assert text.count("\n") == 1

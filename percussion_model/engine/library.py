@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import tempfile
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -115,8 +116,20 @@ def link_solver(solver: str, platform: str, command: Sequence[str], file: Path) 
         Of a C compiler.
     """
     parts = compiler.objects([module_of(solver)], [platform])[platform]
-    source, flags = compiler.HERE / "memory.c", ["-DENGINE_LIBRARY"]
-    compiler.link(platform, command, [source], parts, file, flags)
+    sources, flags = [compiler.HERE / "memory.c"], ["-DENGINE_LIBRARY"]
+    with tempfile.TemporaryDirectory(prefix=".draft-", dir=file.parent) as folder:
+        if "windows" in platform:  # where what is not said to be exported is not
+            sources.append(Path(folder) / "exports.c")
+            sources[-1].write_text(_exports(solver, parts), encoding="utf-8")
+        compiler.link(platform, command, sources, parts, file, flags)
+
+
+def _exports(solver: str, parts: Sequence[Path]) -> str:
+    """C that has a linker for Windows export the entries of objects."""
+    suffixes = [one.stem.rpartition("_")[2] for one in parts]
+    names = [f"{solver}_{name}_{suffix}" for name in ENTRIES for suffix in suffixes]
+    words = "".join(f" -export:{name}" for name in names)
+    return f'__asm__(".section .drectve, \\"yn\\"\\n.ascii \\"{words}\\"\\n.text");\n'
 
 
 # Entries that are over at once; others let threads of Python run meanwhile.
