@@ -6,6 +6,7 @@ import inspect
 import pickle
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 
@@ -66,6 +67,15 @@ def test_threads_do_not_disturb_each_other(solver):
     assert len(found) == THREADS
     for rows in found.values():
         np.testing.assert_array_equal(rows, wanted)
+
+
+def test_threads_may_make_solvers_of_many_rocks_at_once():
+    """More than tables are kept for: none is taken away from one that is being made."""
+    scenes = [Scene().replace(**{"rock.loading_stiffness": 5e8 + 1e6 * k}) for k in range(12)]
+    wanted = [Simulation(scene).observe() for scene in scenes]
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = list(pool.map(lambda scene: Simulation(scene).observe(), scenes * 2))
+    assert found == wanted * 2
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -36,7 +36,7 @@ def build_hammer(
 ) -> str:
     """Write the FMU of a scene; return its GUID.
 
-    It runs by a native library where it brings one for the machine, else by numba.
+    It runs by a native library where it brings one for the machine, else by Python.
 
     Parameters
     ----------

@@ -152,5 +152,5 @@ def library_here() -> dict[str, bytes]:
     try:
         return libraries([this_platform()])
     except NoCompilerError as error:
-        print(f"FMUs are built without a library and run by numba: {error}", file=sys.stderr)
+        print(f"FMUs are built without a library and run by Python: {error}", file=sys.stderr)
         return {}

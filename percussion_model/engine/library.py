@@ -23,7 +23,7 @@ from percussion_model.physics.kernel import DISABLED
 
 # What an installation brings.
 BROUGHT = compiler.HERE / "libraries"
-# Folders of sources that libraries follow from; a name in hidden files is none.
+# Folders of sources that libraries follow from.
 FOLDERS = ("components", "engine", "physics", "scene", "solvers")
 _KINDS: dict[str, Any] = {"w": ctypes.c_int64, "n": ctypes.c_double}
 

@@ -121,6 +121,7 @@ class Motion:
 
 # Motions that were made last, by the solver and what tables follow from.
 _kept: dict[tuple[Any, ...], Motion] = {}
+_keeping = threading.Lock()
 
 
 def _bar_number(name: str) -> int:
@@ -202,12 +203,15 @@ class EngineSolver(Solver):
             return Motion(self._entries, self._image)
         bars = numbers.piston.tobytes(), numbers.bit.tobytes(), numbers.values.piston_model
         key = (self.name, *bars, key_numbers.tobytes())
-        if key not in _kept:
-            made = Motion(self._entries, self._image)
-            while len(_kept) >= MOST_KEPT:
-                del _kept[next(iter(_kept))]
-            _kept[key] = made
-        return Motion(self._entries, self._image, _kept[key])
+        with _keeping:
+            like = _kept.get(key)
+        if like is None:
+            like = Motion(self._entries, self._image)
+            with _keeping:
+                while len(_kept) >= MOST_KEPT:
+                    del _kept[next(iter(_kept))]
+                _kept[key] = like
+        return Motion(self._entries, self._image, like)
 
     def _elastic_bars(self) -> list[str]:
         """Names of the bars that have cells."""

@@ -9,17 +9,16 @@ import numpy as np
 from percussion_model.engine.solver import EngineSolver
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
-from percussion_model.solvers.fem.records import FEM_LIMITS, FEM_PAR, FEM_STATE
-from percussion_model.solvers.modal.records import MODAL_LIMITS, MODAL_PAR, MODAL_STATE
+from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE
+from percussion_model.solvers.modal.records import MODAL_PAR, MODAL_STATE
 from percussion_model.solvers.modal.resolution import COARSER, asked_modes, coarser_modes
 from percussion_model.solvers.rigid.records import (
-    RIGID_LIMITS,
     RIGID_PAR,
     RIGID_STATE,
     ROWS_AN_EVENT,
 )
 from percussion_model.solvers.state import State
-from percussion_model.solvers.wave.records import WAVE_LIMITS, WAVE_PAR, WAVE_STATE
+from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 from percussion_model.solvers.wave.resolution import comparable_steps
 
 # Elements and contact stiffness of runs to compare with, by those of this one.
@@ -33,7 +32,7 @@ class ModalSolver(EngineSolver):
 
     name = "modal"
     time_step: float
-    PAR, STATE, LIMITS = MODAL_PAR, MODAL_STATE, MODAL_LIMITS
+    PAR, STATE = MODAL_PAR, MODAL_STATE
     COUNTS: ClassVar = ("steps", "leaps", "events", "blows", "locked")
 
     def _count_cells(self) -> dict[str, int]:
@@ -56,7 +55,7 @@ class WaveSolver(EngineSolver):
 
     name = "wave"
     time_step: float
-    PAR, STATE, LIMITS = WAVE_PAR, WAVE_STATE, WAVE_LIMITS
+    PAR, STATE = WAVE_PAR, WAVE_STATE
     COUNTS: ClassVar = ("steps", "events", "blows", "locked")
 
     def _elastic_bars(self) -> list[str]:
@@ -96,7 +95,7 @@ class FemSolver(EngineSolver):
 
     name = "fem"
     time_step: float
-    PAR, STATE, LIMITS = FEM_PAR, FEM_STATE, FEM_LIMITS
+    PAR, STATE = FEM_PAR, FEM_STATE
     COUNTS: ClassVar = ("steps", "trials", "events", "blows", "storms", "locked")
 
     def __init__(self, scene: Scene) -> None:
@@ -127,7 +126,7 @@ class RigidSolver(EngineSolver):
     """Rigid bodies from event to event, in closed form."""
 
     name = "rigid"
-    PAR, STATE, LIMITS = RIGID_PAR, RIGID_STATE, RIGID_LIMITS
+    PAR, STATE = RIGID_PAR, RIGID_STATE
     COUNTS: ClassVar = ("events", "contacts", "blows", "cycles", "storms")
 
     def _elastic_bars(self) -> list[str]:

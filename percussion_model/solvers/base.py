@@ -18,7 +18,7 @@ from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.solver_names import register_name
-from percussion_model.solvers.state import Limits, State, common_limits, words_of
+from percussion_model.solvers.state import State, common_limits, words_of
 
 # A state lies ahead of the present after a step that failed half-way, and after a change of
 # inputs; no further than this [s].
@@ -57,8 +57,6 @@ class Solver(ABC):
         Memory of matrices that were made for it.
     COUNTS : tuple of str
         Counts of what was done that a state carries, without their `count_`.
-    LIMITS : Limits or None
-        Of a state from outside; None: those of the fields that all states have.
     """
 
     name: str
@@ -66,7 +64,6 @@ class Solver(ABC):
     wave_speed_error = 0.0
     operator_bytes = 0
     COUNTS: ClassVar[tuple[str, ...]] = ("events", "blows")
-    LIMITS: ClassVar[Limits | None] = None
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -149,7 +146,7 @@ class Solver(ABC):
 
         Kernels look at no index and bound no loop again.
         """
-        fault = (self.LIMITS or common_limits(state.dtype)).fault(state)
+        fault = common_limits(state.dtype).fault(state)
         if not fault and not self.time(state) <= t + MOST_AHEAD:
             return f"its time of {self.time(state)!r} s, far after {t!r} s"
         return fault
