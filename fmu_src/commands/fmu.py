@@ -41,6 +41,7 @@ def fmu(
     flat_names: options.FlatNames = False,
     force: options.Force = False,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     scene_option: options.BakedToo = None,
 ) -> None:
     """Bake a scene into an FMU for co-simulation, FMI 2.0, which runs Python.
@@ -51,7 +52,7 @@ def fmu(
         if pneumatics:
             write_drive(output, flat_names)
             return
-        path = write_hammer(scene, output, platforms, force, scene_option, rock, flat_names)
+        path = write_hammer(scene, output, platforms, force, scene_option, rock, flat_names, bit)
         if no_reference:
             return
         from fmu_src.reference import write_reference
@@ -71,6 +72,7 @@ def write_hammer(
     scene_option: Path | None = None,
     rock: str | None = None,
     flat_names: bool = False,
+    bit: str | None = None,
 ) -> Path:
     """Write the FMU of a scene and say so; the parameters are those of `fmu`."""
     from fmu_src.archive import content, state_of
@@ -78,7 +80,7 @@ def write_hammer(
     from fmu_src.native.library import COMPILING, libraries, library_here
     from percussion_model.interface.progress import progress
 
-    file, chosen = options.baked_scene(scene, scene_option, rock)
+    file, chosen = options.baked_scene(scene, scene_option, rock, bit)
     names = None if platforms is None else _export_platforms(platforms)
     path = output or options.DIST / hammer_name(file)
     about_hammer(chosen, path)  # refuses a name, before anything is compiled or --force offered
@@ -89,7 +91,7 @@ def write_hammer(
     before = content(path)
     with progress("building the FMU"):
         guid = build_hammer(chosen, path, made, flat_names)
-    source = options.baked_from(scene, scene_option, rock)
+    source = options.baked_from(scene, scene_option, rock, bit)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
     return path
 

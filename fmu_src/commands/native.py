@@ -27,6 +27,7 @@ def native(
     flat_names: options.FlatNames = False,
     force: options.Force = False,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     scene_option: options.BakedToo = None,
 ) -> None:
     """Bake a scene into FMUs that need no Python, of FMI 2.0 and 3.0.
@@ -45,7 +46,7 @@ def native(
             raise common.refusal(
                 f"-o {output}: must be a folder, which two FMUs go to, of FMI 2.0 and of FMI 3.0"
             )
-        file, chosen = options.baked_scene(scene, scene_option, rock)
+        file, chosen = options.baked_scene(scene, scene_option, rock, bit)
         names = platform_names((platforms or this_platform()).split(","))
         files = native_files(file, output)
         for path in files.values():
@@ -53,7 +54,7 @@ def native(
         common.check_outputs(output, None)
         with progress(COMPILING):
             made = libraries(names)
-        source = options.baked_from(scene, scene_option, rock)
+        source = options.baked_from(scene, scene_option, rock, bit)
         for version, path in files.items():
             before = content(path)
             with progress(f"building the FMU of FMI {version}"):

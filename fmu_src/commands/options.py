@@ -34,23 +34,27 @@ Force = Annotated[bool, typer.Option("--force", help="Replace the FMU of another
 
 
 def baked_scene(
-    named: Path | None, option: Path | None, rock: str | None = None
+    named: Path | None, option: Path | None, rock: str | None = None, bit: str | None = None
 ) -> tuple[Path, Scene]:
-    """File of the scene to bake, and the scene, with the rock that is asked for."""
+    """File of the scene to bake, and the scene, with rock and bit that are asked for."""
     from percussion_model.scene.presets import scene_file
     from percussion_model.scene.scene import Scene
 
     if named is not None and option is not None:
         raise common.refusal(f"--scene {option}: a scene is given already, {named}")
     file = scene_file(named or option or REFERENCE)
-    return file, Scene.from_toml(file).replace(**common.rock_changes(rock))
+    scene = common.with_bit(Scene.from_toml(file), bit)
+    return file, scene.replace(**common.rock_changes(rock, scene))
 
 
-def baked_from(named: Path | None, option: Path | None, rock: str | None = None) -> str:
+def baked_from(
+    named: Path | None, option: Path | None, rock: str | None = None, bit: str | None = None
+) -> str:
     """Say which scene was baked, for the line that tells of the FMU."""
     chosen = named or option
     told = f"from the scene {chosen or REFERENCE}{'' if chosen else ', since none was named'}"
-    return told if rock is None else f"{told}, with the rock {rock}"
+    added = [f"the {name} {one}" for name, one in (("rock", rock), ("bit", bit)) if one]
+    return told + (f", with {' and '.join(added)}" if added else "")
 
 
 def list_choices(about: Mapping[str, str]) -> None:

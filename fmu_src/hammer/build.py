@@ -59,7 +59,7 @@ def build_hammer(
     resources: dict[str, str | bytes] = {
         FILE: write_variables(variables),
         # what an instance needs of the scene, besides its variables
-        "scene.json": to_json({"given": given_values(scene), "identity": identity}),
+        "scene.json": to_json({"given": scene.given_values(), "identity": identity}),
     }
     model = None
     if not added_solvers():  # the library has the solvers of the package alone
@@ -87,7 +87,7 @@ def refuse_other(path: Path, scene: Scene, force: bool = False) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             found = json.loads(archive.read(SCENE))
-            same = found["given"] == json.loads(to_json(given_values(scene)))
+            same = found["given"] == json.loads(to_json(scene.given_values()))
     except (
         OSError,
         ValueError,
@@ -104,11 +104,6 @@ def refuse_other(path: Path, scene: Scene, force: bool = False) -> None:
             f"{path}: holds another FMU than that of this scene; --force replaces it, another -o "
             "keeps it"
         )
-
-
-def given_values(scene: Scene) -> dict[str, object]:
-    """What was given of a scene, as an FMU has it: of the hole's diameter nothing depends there."""
-    return scene.replace(hole_diameter=None).given_values()
 
 
 def hammer_name(scene: Path) -> str:

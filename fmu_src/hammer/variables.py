@@ -19,6 +19,7 @@ from fmu_src.hammer.inputs import NAMES_OUTSIDE
 from fmu_src.hammer.outputs import MODES, OUTPUTS
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Variable, magnitude, number_row
+from percussion_model.components import COMPONENTS
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row, parameter_table
 from percussion_model.scene.rows import ParameterRow
@@ -63,6 +64,13 @@ LEFT_OUT = {
     "contact.restitution": (-1.0, "-1: St Venant"),
     "gauge.position": (-1.0, "-1: the middle"),
     "fem.damping_ratio": (-1.0, "-1: by loss.time"),
+    "hole_diameter": (0.0, "0: not known"),
+    **{
+        f"{one.name}.{name}": (0.0, "0: not given")
+        for one in COMPONENTS
+        for name, (default, *_) in one.parameters.items()
+        if default is None
+    },
 }
 
 

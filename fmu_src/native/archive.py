@@ -9,7 +9,6 @@ from typing import Literal
 
 from fmu_src.archive import HERE, MODEL, SCENE, digest, licence, write_described
 from fmu_src.description import About
-from fmu_src.hammer.build import given_values
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native.description import write_native_description
 from fmu_src.native.description3 import write_description3
@@ -56,7 +55,7 @@ def write_native_fmu(
         "documentation/licenses/license.txt": licence(),
         MODEL: model(""),
         # what nothing that runs reads: whose FMU this is
-        SCENE: to_json({"given": given_values(scene)}).encode(),
+        SCENE: to_json({"given": scene.given_values()}).encode(),
         **_pictures(version, about.flat),
     }
     for platform, library in libraries.items():

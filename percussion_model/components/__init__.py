@@ -1,57 +1,95 @@
-"""Components that act on piston or bit, one file each.
+"""Components that act on piston, bit and hole, one file each.
 
-Each module of this folder that defines `COMPONENT` is found by itself. Its force acts on the
-body by mass, as weight and feed do. Its parameters, its switch in `[effects]`, its state, the
-columns that show it and its entry of the ledger follow from the same definition
+Each module of this folder that defines `COMPONENT` is found by itself. A force acts on the
+body by mass, as weight and feed do. Parameters, switch in `[effects]`, inputs, state, the
+columns that show it and entries of the ledger follow from the same definition
 (CONTRIBUTING.md, "To add a component").
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
 
 class Component(NamedTuple):
-    """A force on a body that follows from the motion, and from a state of its own.
+    """What follows from the motion, and from a state of its own; all kernels but one may be None.
 
     Attributes
     ----------
     name : str
-        Of the switch `effects.NAME`, of the table `[NAME]` that holds its parameters,
-        and of its entry of the ledger.
+        Of the switch `effects.NAME` and of the table `[NAME]` that holds its parameters.
     description : str
         For the list of parameters.
-    parameters : dict of tuple
+    parameters : mapping of tuple
         Default, unit, description, least and greatest value by name; kernels find the
-        parameter X as `par.NAME_X`.
-    force : kernel
+        parameter X as `par.NAME_X`. A default of None has to be given where the component is
+        on; one that is true or false makes a flag, a least value of int a whole number.
+    force : kernel or None
         force(par, s, h) -> mean force over the next time h in which the body moves on, down
         positive [N]. A mean that is off by h^2 makes a motion that is off by h^2.
     body : {"bit", "piston"}
         That it acts on. A force on the piston is part of the drive's.
-    state : dict of tuple
+    state : mapping of tuple
         Unit, description and start of each field by name: a number, or the name of a parameter
         that holds it. Kernels find the field X as `s.NAME_X`, and it is a column `NAME_X`.
     pass_time : kernel or None
         pass_time(par, s, h): take the state on by a time h, at whose end the bodies are.
+    inputs : tuple of str
+        Parameters that may change during a run: kernels find X as `s.NAME_X`.
+    gained : kernel or None
+        gained(par, s, deeper) -> part of what a loading crushes deeper [m] by which the hole
+        advances; the bit climbs out of the rest where it turns.
+    end_loading : kernel or None
+        end_loading(par, s, gained): a drilling cycle is at its peak.
+    kept : kernel or None
+        kept(par, s, period) -> share of their depth that craters keep where the bit has turned
+        for a time [s].
+    next_blow : kernel or None
+        next_blow(par, s, period, kept, rest, push, climb): a blow begins, a period [s] after
+        the one before. Feed and weight of the bit are the force at `rest`, with the drive and
+        the piston the mean one, `push` [N], against which the bit has climbed [m].
+    of_blow : tuple of str
+        Fields of the state whose value after a blow is a column of blows, `NAME_X`.
+    entries : mapping of tuple
+        Further entries of the ledger by name: "work" or "dissipated", and what it is. Kernels
+        add to `s.e_ENTRY`.
+    needs : mapping of tuple
+        What must hold for it to matter: values that a key may have, by the key.
     """
 
     name: str
     description: str
-    parameters: dict[str, tuple[float, str, str, float, float]]
-    force: Callable[..., float]
+    parameters: Mapping[str, tuple[float | bool | None, str, str, float, float]]
+    force: Callable[..., float] | None = None
     body: Literal["bit", "piston"] = "bit"
-    state: Any = MappingProxyType({})
+    state: Mapping[str, tuple[str, str, float | str]] = _NOTHING
     pass_time: Callable[..., None] | None = None
+    inputs: tuple[str, ...] = ()
+    gained: Callable[..., float] | None = None
+    end_loading: Callable[..., None] | None = None
+    kept: Callable[..., float] | None = None
+    next_blow: Callable[..., None] | None = None
+    of_blow: tuple[str, ...] = ()
+    entries: Mapping[str, tuple[Literal["work", "dissipated"], str]] = _NOTHING
+    needs: Mapping[str, tuple[Any, ...]] = _NOTHING
 
     @property
     def fields(self) -> tuple[str, ...]:
         """Names of its state's fields in the state of a solver."""
         return tuple(f"{self.name}_{field}" for field in self.state)
+
+    @property
+    def ledger(self) -> dict[str, tuple[str, str]]:
+        """Entries of the ledger, that of its force before others: side and meaning by name."""
+        taken = f"taken from the {self.body} by this force"
+        of_force = {} if self.force is None else {self.name: ("dissipated", taken)}
+        return {**of_force, **self.entries}
 
 
 def _components() -> tuple[Component, ...]:
@@ -60,3 +98,12 @@ def _components() -> tuple[Component, ...]:
 
 
 COMPONENTS = _components()
+# Those that push.
+FORCES = tuple(one for one in COMPONENTS if one.force is not None)
+
+
+def entries_on(side: str) -> tuple[str, ...]:
+    """Names of the ledger's entries of components that are "work" or "dissipated"."""
+    return tuple(
+        name for one in COMPONENTS for name, (found, _) in one.ledger.items() if found == side
+    )

@@ -18,6 +18,7 @@ import typer
 
 from percussion_model.interface.commands.accuracy import accuracy
 from percussion_model.interface.commands.bench_controller import bench_controller
+from percussion_model.interface.commands.bits import bits
 from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
@@ -169,6 +170,7 @@ for _command in (
     bench_controller,
     new,
     rocks,
+    bits,
 ):
     add(_command)
 add(explore, waits=True)

@@ -427,7 +427,7 @@ def _render(template: str, scene: Scene, changed: dict[str, Any], **values: Any)
 def _parameter_rows(scene: Scene, changed: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Key, value, unit and description of each parameter that has an influence."""
     rows = []
-    for row in (HOLE_DIAMETER, *parameter_table()):
+    for row in parameter_table():
         if row is HOLE_DIAMETER and scene.hole_diameter is None:
             continue
         if "*" not in row.key and scene.matters(row.key):

@@ -8,9 +8,19 @@ bar transits (docs/model.md, section 7).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
+from typing import Any
 
-from percussion_model.physics.kernel import inlined, kernel, merged
-from percussion_model.physics.records import DriveKind, EventKind, Mode, Piston
+from percussion_model.physics.kernel import composed, inlined, kernel, merged
+from percussion_model.physics.place import move_place
+from percussion_model.physics.records import (
+    BLOW_COLUMNS,
+    Column,
+    DriveKind,
+    EventKind,
+    Mode,
+    Piston,
+)
 from percussion_model.physics.rock import hole_depth
 from percussion_model.physics.state import CHECKPOINTS
 
@@ -29,7 +39,7 @@ def push_event(s, events, time, kind, value):
         row.time = time
         row.kind = kind
         row.value = value
-        row.bit_position = s.x_r + s.p
+        row.bit_position = s.x_r + s.p - s.climb
         s.n_events += 1
 
 
@@ -74,6 +84,32 @@ def standstill_force(s, time, impulse):
     return math.nan
 
 
+@composed
+def _nothing(s: Any, row: Any) -> None:
+    pass
+
+
+def _and_column(before: Callable, name: str, field: str) -> Callable:
+    @composed
+    def copy(s: Any, row: Any) -> None:
+        before(s, row)
+        row[name] = s[field]
+
+    return copy
+
+
+def filled_from_state(columns: Iterable[Column]) -> Callable:
+    """Kernel fill(s, row) that writes the columns that are fields of a state."""
+    fill = _nothing
+    for column in columns:
+        if column.of:
+            fill = _and_column(fill, column.name, column.of)
+    return fill
+
+
+fill_row = filled_from_state(BLOW_COLUMNS)
+
+
 @merged
 def finish_blow(par, s, blows, time, bit_position):
     """Write the row of the blow that ends at `time`."""
@@ -100,6 +136,7 @@ def finish_blow(par, s, blows, time, bit_position):
     row.barrier_margin = s.b_barrier
     row.counting_margin = s.b_counting
     row.closing_speed = s.b_closing
+    fill_row(s, row)
     s.n_blows += 1
 
 
@@ -116,8 +153,9 @@ def start_blow(par, s, blows, time, piston_velocity, bit_position, standstill):
     standstill : float
         Mean bit force at the end of the standstill before, NaN where there was none [N].
     """
+    move_place(par, s, time)
     if s.live == 1 and s.b_started == 1:
-        finish_blow(par, s, blows, time, bit_position)
+        finish_blow(par, s, blows, time, bit_position - s.climb)
     s.b_standstill = standstill
     s.b_started = 1
     s.count_blows += 1
@@ -128,7 +166,7 @@ def start_blow(par, s, blows, time, piston_velocity, bit_position, standstill):
     s.b_stroke = 0.0
     s.b_peak_contact = 0.0
     s.b_peak_bit = 0.0
-    s.b_position = bit_position
+    s.b_position = bit_position - s.climb
     s.b_hole = hole_depth(par, s)
     s.b_rock0 = s.rock_work
     s.b_contact0 = s.i_contact

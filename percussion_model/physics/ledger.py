@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from percussion_model.components import COMPONENTS
+from percussion_model.components import entries_on
 from percussion_model.physics.records import LEDGER_FIELDS, STORED_FIELDS
 
-WORKS = ("drive", "feed", "gravity")
+WORKS = ("drive", "feed", "gravity", "climb", "refill", *entries_on("work"))
 DISSIPATED = (
     *("crushing", "barrier", "standstill", "loss", "contact", "joints", "ends"),
-    *(one.name for one in COMPONENTS),
+    *entries_on("dissipated"),
 )
 NUMERICAL = ("numerical", "overshoot")
 STORED = ("kinetic", "elastic", "recoverable")

@@ -9,13 +9,14 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from percussion_model.components import COMPONENTS, Component
+from percussion_model.components import COMPONENTS, FORCES, Component
 from percussion_model.physics.blows import push_event
+from percussion_model.physics.feed import feed_on_bit, throttle
 from percussion_model.physics.kernel import composed, inlined, merged
 from percussion_model.physics.records import DriveKind, EventKind
 
-_ON_BIT = [one for one in COMPONENTS if one.body == "bit"]
-_ON_PISTON = [one for one in COMPONENTS if one.body == "piston"]
+_ON_BIT = [one for one in FORCES if one.body == "bit"]
+_ON_PISTON = [one for one in FORCES if one.body == "piston"]
 
 
 @composed
@@ -29,6 +30,7 @@ def _nothing(par: Any, s: Any, amount: float) -> None:
 
 
 def _and_force(before: Callable, one: Component) -> Callable:
+    force: Any
     force, present, held = one.force, f"with_{one.name}", f"f_{one.name}"
 
     @composed
@@ -109,13 +111,13 @@ def pass_time(par, s, h):
 @inlined
 def bit_load(par, s):
     """Constant force on the bit: weight, feed and forces of components [N]."""
-    return par.mass_b * par.gravity + (s.feed + s.f_on_bit)
+    return par.mass_b * par.gravity + (feed_on_bit(par, s) + s.f_on_bit)
 
 
 @inlined
 def bit_acceleration(par, s):
     """Acceleration that its body forces give the bit [m/s^2], docs/model.md, eq. 3."""
-    return par.gravity + (s.feed + s.f_on_bit) / par.mass_b
+    return par.gravity + (feed_on_bit(par, s) + s.f_on_bit) / par.mass_b
 
 
 @inlined
@@ -127,7 +129,7 @@ def piston_acceleration(par, push):
 @inlined
 def book_bit_load(par, s, path):
     """Enter the work of the bit's body forces over a path of its mean motion [m]."""
-    s.e_feed += s.feed * path
+    s.e_feed += feed_on_bit(par, s) * path
     s.e_gravity += par.mass_b * par.gravity * path
     if par.effects == 1:
         book_on_bit(par, s, path)
@@ -182,7 +184,7 @@ def time_to_cover(distance, velocity, acceleration):
 def drive_force(par, s):
     """Force of drive and components on the piston, down positive [N]."""
     if par.drive == DriveKind.PRESSURE:
-        return s.alpha * s.drive_force + s.f_on_piston
+        return s.alpha * s.drive_force * throttle(par, s) + s.f_on_piston
     if par.drive == DriveKind.EXTERNAL:
         return s.external + s.f_on_piston
     return s.f_on_piston

@@ -12,6 +12,7 @@ import math
 
 from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import inlined, kernel, merged, scalar
+from percussion_model.physics.records import Cuttings
 
 # Below this share of the reference penetration, or of the force there, the power law goes on as
 # a straight line: nothing that moves a bit is so small.
@@ -201,6 +202,8 @@ def secant_stiffness(force, stiffness, exponent, reference_penetration):
 @merged
 def peak_above(par, s, left):
     """Penetration from which the rock would unload to `left` [m]."""
+    if par.exponent == 1.0 and par.unloading_exponent == 0.0 and par.chipping_penetration == 0.0:
+        return left * s.gamma / (s.gamma - 1.0)
     low, high = left, 2.0 * left
     for _ in range(MOST_TURNS):
         if high - fresh_recovery(par, s, high, fresh_force(par, s, high)) >= left:
@@ -274,8 +277,10 @@ def left_depth(par, depth):
     depth : float
         Of the crater below the surface of the rock [m].
     """
-    if par.cuttings == 0 or depth <= 0.0:
+    if par.cuttings == Cuttings.NONE or depth <= 0.0:
         return 0.0
+    if par.cuttings == Cuttings.INDEXED:
+        return depth
     removed = par.removed_share * depth
     if par.removal_exponent != 1.0:
         removed *= exp((par.removal_exponent - 1.0) * log(depth / CRATER))

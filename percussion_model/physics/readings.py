@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
-from percussion_model.physics.kernel import composed, merged, when_compiling
+from percussion_model.physics.blows import filled_from_state
+from percussion_model.physics.kernel import merged, when_compiling
 from percussion_model.physics.loads import drive_force
 from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, SAMPLE_COLUMNS, Piston
 from percussion_model.physics.rock import hole_depth
@@ -29,25 +29,8 @@ def _teach() -> None:
 when_compiling(_teach)
 
 
-@composed
-def _nothing(s: Any, reading: Any) -> None:
-    pass
-
-
-def _and_column(before: Callable, name: str, field: str) -> Callable:
-    @composed
-    def copy(s: Any, reading: Any) -> None:
-        before(s, reading)
-        reading[name] = s[field]
-
-    return copy
-
-
 # fill_columns(s, reading): write the columns that are fields of a state.
-fill_columns = _nothing
-for _column in SAMPLE_COLUMNS:
-    if _column.of:
-        fill_columns = _and_column(fill_columns, _column.name, _column.of)
+fill_columns = filled_from_state(SAMPLE_COLUMNS)
 
 
 @merged
@@ -65,9 +48,9 @@ def fill_motion(par, s, reading, time, piston_position, bit_position):
         Mean displacements since the start of the run [m].
     """
     reading.time = time
-    reading.piston_position = piston_position
-    reading.bit_position = bit_position
-    reading.bit_end_position = s.x_r + s.p
+    reading.piston_position = piston_position - s.climb
+    reading.bit_position = bit_position - s.climb
+    reading.bit_end_position = s.x_r + s.p - s.climb
     reading.hole_depth = hole_depth(par, s)
     reading.drive_force = drive_force(par, s)
     fill_columns(s, reading)

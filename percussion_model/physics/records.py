@@ -77,6 +77,14 @@ class RockKind(IntEnum):
     WALL = 3
 
 
+class Cuttings(IntEnum):
+    """What is left of a crater where a drilling cycle begins in it."""
+
+    NONE = 0
+    FLUSHED = 1  # what flushing leaves
+    INDEXED = 2  # all: the bit's rotation decides
+
+
 class Column(NamedTuple):
     """A column of what a run finds, as files and documents name it.
 
@@ -137,6 +145,11 @@ BLOW_COLUMNS = (
         "energy crushed by a cycle divided by W_R/100, less 1, where it came closest to 0",
     ),
     Column("closing_speed", "m/s", "least speed at which the gap of piston and bit closed"),
+    *(
+        Column(f"{one.name}_{name}", *one.state[name][:2], of=f"{one.name}_{name}")
+        for one in COMPONENTS
+        for name in one.of_blow
+    ),
 )
 BLOW = np.dtype([(column.name, column.kind) for column in BLOW_COLUMNS], align=True)
 
@@ -201,7 +214,13 @@ LEDGER_COLUMNS = (
     Column("joints", "J", "taken by joints and the damper"),
     Column("ends", "J", "leaves by ends without reflection, less what comes in there"),
     Column("overshoot", "J", "lost by springs where an event is found just past its place"),
-    *(Column(one.name, "J", f"taken from the {one.body} by this force") for one in COMPONENTS),
+    Column("climb", "J", "work of the rotation that lifts the bit out of its craters"),
+    Column("refill", "J", "work of cuttings in old craters, which carry the bit as if lifted"),
+    *(
+        Column(name, "J", meaning)
+        for one in COMPONENTS
+        for name, (_, meaning) in one.ledger.items()
+    ),
 )
 LEDGER_FIELDS = tuple(column.name for column in LEDGER_COLUMNS)
 

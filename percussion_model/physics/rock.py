@@ -12,10 +12,12 @@ of the force where they meet of second.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import inlined, kernel, merged
+from percussion_model.physics.kernel import composed, inlined, kernel, merged
 from percussion_model.physics.power_law import (
     CHIPPING_SLOPE,
     force_and_work,
@@ -156,14 +158,83 @@ def unloaded_penetration(par, s):
 
 
 @inlined
-def hole_depth(par, s):
-    """Depth of the rock's surface if the bit were unloaded now (docs/model.md, eq. 20a) [m]."""
-    if par.rock != RockKind.BILINEAR:
-        return 0.0
+def pressed_depth(par, s):
+    """Depth of the rock's surface by what is pressed in (docs/model.md, eq. 20a) [m]."""
     surface = s.p_u
     if is_loading(s):
         surface = unloaded_penetration(par, s)
     return s.x_r - s.hole_start + surface
+
+
+@composed
+def _all_gained(par: Any, s: Any, deeper: float) -> float:
+    return deeper
+
+
+@composed
+def _nothing(par: Any, s: Any, gained: float) -> None:
+    pass
+
+
+def _or_less(before: Callable, one: Component) -> Callable:
+    gain, present = one.gained, f"with_{one.name}"
+    if gain is None:
+        return before
+
+    @composed
+    def gained(par: Any, s: Any, deeper: float) -> float:
+        least = before(par, s, deeper)
+        if par[present] == 1:
+            least = min(least, gain(par, s, deeper))
+        return least
+
+    return gained
+
+
+def _and_end(before: Callable, one: Component) -> Callable:
+    book, present = one.end_loading, f"with_{one.name}"
+    if book is None:
+        return before
+
+    @composed
+    def end(par: Any, s: Any, gained: float) -> None:
+        before(par, s, gained)
+        if par[present] == 1:
+            book(par, s, gained)
+
+    return end
+
+
+# gained_of(par, s, deeper): advance of the hole by a loading that presses so much deeper [m].
+gained_of = _all_gained
+# note_gained(par, s, gained): components that follow loadings.
+note_gained = _nothing
+for _one in COMPONENTS:
+    gained_of, note_gained = _or_less(gained_of, _one), _and_end(note_gained, _one)
+
+
+@inlined
+def hole_depth(par, s):
+    """Depth of the hole (docs/model.md, eqs 20a and 20f) [m]."""
+    if par.rock != RockKind.BILINEAR:
+        return 0.0
+    depth = pressed_depth(par, s)
+    if par.places == 0:
+        return depth
+    not_gained = s.climb + s.pit
+    if is_loading(s):
+        deeper = depth - s.cycle_depth
+        not_gained += deeper - gained_of(par, s, deeper)
+    return depth - not_gained
+
+
+@inlined
+def leave_pit(par, s):
+    """Note how much of the loading that ends the hole does not gain."""
+    deeper = pressed_depth(par, s) - s.cycle_depth
+    gained = gained_of(par, s, deeper)
+    s.pit += deeper - gained
+    note_gained(par, s, gained)
 
 
 @inlined
@@ -205,6 +276,8 @@ def start_cycle(par, s, force):
         s.mode = Mode.DFC
     else:
         s.mode = Mode.FC
+    if par.places == 1:
+        s.cycle_depth = pressed_depth(par, s)
 
 
 @kernel
@@ -213,14 +286,16 @@ def resume_cycle(par, s):
     stiff = s.gamma * s.k_r
     force = stiff * (s.p - s.p_u)  # that of the spring, in BC and SS
     before = recoverable(par, s)
-    depth = hole_depth(par, s)
+    depth = pressed_depth(par, s)
     start_cycle(par, s, force)
     if par.power == 1:
         resume_loading(par, s, force, force / stiff)
-        s.hole_start += hole_depth(par, s) - depth
+        s.hole_start += pressed_depth(par, s) - depth
     else:
         # Other rock under the same force springs back otherwise, which crushes nothing.
         s.hole_start += force / stiff - force / (s.gamma * s.k_r)
+    if par.places == 1:
+        s.cycle_depth = pressed_depth(par, s)
     # With other rock than before, what can be recovered changes at once.
     s.e_crushing += before - recoverable(par, s)
 
@@ -235,6 +310,8 @@ def end_loading(par, s):
         margin = s.crushed / max(COUNTED_CYCLE * s.w_r, LEAST_ENERGY) - 1.0
         if not abs(s.b_counting) <= abs(margin):
             s.b_counting = margin
+    if par.places == 1:
+        leave_pit(par, s)
     if par.power == 1:
         force = loading_force(par, s, s.p)
         given_back = recovery(par, s, s.p, force)
@@ -470,6 +547,9 @@ def take_line(par, s):
     where the rock begins and ends to chip.
     """
     a = s.p
+    if par.exponent == 1.0 and par.chipping_penetration == 0.0 and not is_reloading(s, a):
+        s.line_stiffness, s.line_origin, s.line_end = s.k_r, 0.0, math.inf
+        return
     kink = next_kink(par, s, a)
     if kink - a <= CLOSE * a:
         a = kink

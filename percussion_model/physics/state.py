@@ -7,7 +7,7 @@ puts its own fields first: numba takes a record that only has more at its end fo
 
 from __future__ import annotations
 
-from percussion_model.components import COMPONENTS
+from percussion_model.components import COMPONENTS, FORCES
 from percussion_model.physics.records import LEDGER_ENTRIES, Mode
 
 # Checkpoints of the running bit impulse during standstill.
@@ -31,11 +31,15 @@ COMMON_PARAMETERS = [
     ("buttons", "f8"),  # that share the load of a power law
     ("chipping_force", "f8"),  # of all buttons [N]
     ("chipping_penetration", "f8"),  # over which they chip, 0 where they do not [m]
-    ("cuttings", "i8"),  # 1: cuttings stay in the crater
+    ("cuttings", "i8"),  # Cuttings
     ("removed_share", "f8"),  # of a crater of 1 mm
     ("removal_exponent", "f8"),
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
-    ("effects", "i8"),  # 1: there are components
+    ("on_casing", "i8"),  # 1: feed acts on the casing
+    ("casing_weight", "f8"),  # [N]
+    ("hole_area", "f8"),  # [m2], 0 where it is not known
+    ("places", "i8"),  # 1: from blow to blow the bit climbs out of its craters, or turns
+    ("effects", "i8"),  # 1: there are components that push
     *[(f"with_{one.name}", "i8") for one in COMPONENTS],
     *[(f"{one.name}_{name}", "f8") for one in COMPONENTS for name in one.parameters],
 ]
@@ -72,7 +76,8 @@ _INPUTS = [  # changed from outside at grid points
     ("next_w_r", "f8"),
     ("f_on_bit", "f8"),  # sums of the forces of components [N]
     ("f_on_piston", "f8"),
-    *[(f"f_{one.name}", "f8") for one in COMPONENTS],
+    *[(f"f_{one.name}", "f8") for one in FORCES],
+    *[(f"{one.name}_{name}", "f8") for one in COMPONENTS for name in one.inputs],
     *[(field, "f8") for one in COMPONENTS for field in one.fields],
 ]
 
@@ -90,6 +95,12 @@ _MOTION = [
     ("resumed_force", "f8"),  # under which this cycle began [N]
     ("resumed_share", "f8"),  # of what it would give back of its own then
     ("crushed", "f8"),  # by this drilling cycle [J]
+    ("cycle_depth", "f8"),  # depth pressed in at which it began [m]
+    ("pit", "f8"),  # depth of the craters in which the bit is [m]
+    ("climb", "f8"),  # how far it has climbed out of craters [m]
+    ("place_time", "f8"),  # when it came to this place [s]
+    ("place_drive", "f8"),  # impulse of the drive then [N s]
+    ("recoil_share", "f8"),  # recoil of the last blow, by the force of a pressure law
     ("v_p", "f8"),  # mean velocities [m/s]
     ("v_b", "f8"),
     ("u_r", "f8"),  # relative mean displacement of the pressure law [m]

@@ -33,6 +33,12 @@ class Rule(IntEnum):
     ACCURACY_WITHOUT_LOSS_TIME = 15
     BARRIER = 16
     SETTLE = 17
+    BREAKING_WITHOUT_HOLE = 18
+    BREAKING_WITHOUT_BUTTONS = 19
+    ROTATION_WITHOUT_RADIUS = 20
+    ROTATION_AND_CUTTINGS = 21
+    CASING_AND_DAMPER = 22
+    MOTOR = 23
 
 
 _OF_STRING = (
@@ -100,6 +106,30 @@ TEXTS = {
         'effects.barrier = true needs effects.rock = "bilinear" or "power", not "{effects.rock}": '
         "set effects.barrier = false"
     ),
+    Rule.BREAKING_WITHOUT_HOLE: (
+        "effects.breaking = true needs hole_diameter, the diameter of the hole: give it, or a bit "
+        "(--bit), or set effects.breaking = false"
+    ),
+    Rule.BREAKING_WITHOUT_BUTTONS: (
+        "effects.breaking = true needs breaking.buttons, the number of the bit's buttons: give it, "
+        "or a bit (--bit), or set effects.breaking = false"
+    ),
+    Rule.ROTATION_WITHOUT_RADIUS: (
+        "effects.rotation = true needs rotation.mean_radius, on which the bit's buttons are: give "
+        "it, or a bit (--bit), or set effects.rotation = false"
+    ),
+    Rule.ROTATION_AND_CUTTINGS: (
+        "rotation.old_line and effects.cuttings both say what is left of craters: set one of "
+        "them to false"
+    ),
+    Rule.CASING_AND_DAMPER: (
+        'feed.on = "casing" and effects.damper = true both have a casing: set feed.on = "bit", '
+        "which damper and feed then push, or effects.damper = false"
+    ),
+    Rule.MOTOR: (
+        "rotation.full_torque = {rotation.full_torque!r} N m: must be at most "
+        "rotation.stall_torque = {rotation.stall_torque!r} N m"
+    ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
 }
 
@@ -121,6 +151,7 @@ def _place(key: str, word: str) -> int:
 ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")
 PISTON_ELASTIC, PISTON_ABSENT = (_place("piston.model", word) for word in ("elastic", "absent"))
 NO_DRIVE = _place("effects.drive", "none")
+ON_CASING = _place("feed.on", "casing")
 BILINEAR, POWER = (_place("effects.rock", word) for word in ("bilinear", "power"))
 AUTO, FEM, WAVE = (_place("solver.name", word) for word in ("auto", "fem", "wave"))
 BY_WAVES = _place("solver.fidelity", "wave")
@@ -157,6 +188,13 @@ def find_contradiction(v: Any, bodies: int, has_rods: bool, is_barrier_given: bo
     is_crushed = v.effects_rock == BILINEAR or v.effects_rock == POWER
     if v.effects_barrier and not is_crushed and is_barrier_given:
         return Rule.BARRIER
+    if is_crushed:
+        found = _in_breaking(v)
+    has_casing = v.effects_damper and v.effects_string
+    if has_casing and v.effects_feed and v.feed_on == ON_CASING:
+        found = Rule.CASING_AND_DAMPER
+    if found != Rule.NOTHING:
+        return found
     return Rule.SETTLE if v.run_settle >= v.run_duration else Rule.NOTHING
 
 
@@ -172,6 +210,23 @@ def _in_string(v: Any, has_rods: bool) -> Rule:
         return Rule.FIDELITY_OF_STRING
     if v.solver_name != AUTO and v.solver_name != WAVE:
         return Rule.SOLVER_OF_STRING
+    return Rule.NOTHING
+
+
+def _in_breaking(v: Any) -> Rule:
+    """What breaking and rotation need, or that goes with neither."""
+    if v.effects_breaking:
+        if not v.hole_diameter > 0.0:
+            return Rule.BREAKING_WITHOUT_HOLE
+        if not v.breaking_buttons > 0.0:
+            return Rule.BREAKING_WITHOUT_BUTTONS
+    if v.effects_rotation:
+        if not v.rotation_mean_radius > 0.0:
+            return Rule.ROTATION_WITHOUT_RADIUS
+        if v.effects_cuttings and v.rotation_old_line:
+            return Rule.ROTATION_AND_CUTTINGS
+        if v.rotation_stall_torque > 0.0 and v.rotation_full_torque > v.rotation_stall_torque:
+            return Rule.MOTOR
     return Rule.NOTHING
 
 

@@ -26,6 +26,7 @@ SOLVER_FEM: Needs = {"solver.name": ("fem",)}
 ALL_RIGID: Needs = {"piston.model": ("rigid",), "bit.model": ("rigid",)}
 GRAVITY_ON: Needs = {"effects.gravity": (True,)}
 FEED_ON: Needs = {"effects.feed": (True,)}
+FEED_ON_CASING: Needs = {"feed.on": ("casing",), **FEED_ON}
 DRIVE_PRESSURE: Needs = {"effects.drive": ("pressure",)}
 DRIVE_EXTERNAL: Needs = {"effects.drive": ("external",)}
 LOSS_ON: Needs = {"effects.loss": (True,), **HAS_WAVES}

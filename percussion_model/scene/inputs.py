@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from percussion_model.components import COMPONENTS
 from percussion_model.scene.rows import REFUSED
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.units import read_value, refuse
@@ -40,6 +41,11 @@ INPUTS = {
     "unloading_ratio": Input("rock.unloading_ratio", "next_gamma", False),
     "barrier_damping": Input("rock.barrier_damping", "next_c_r", False),
     "barrier_energy": Input("rock.barrier_energy", "next_w_r", False),
+    **{
+        f"{one.name}_{name}": Input(f"{one.name}.{name}", f"{one.name}_{name}", True)
+        for one in COMPONENTS
+        for name in one.inputs
+    },
 }
 
 

@@ -32,6 +32,7 @@ from percussion_model.scene.group import (
     DRIVE_EXTERNAL,
     DRIVE_PRESSURE,
     FEED_ON,
+    FEED_ON_CASING,
     GRAVITY_ON,
     HAS_PISTON,
     HAS_WAVES,
@@ -126,16 +127,25 @@ class Gravity(Parameters):
 
 
 class Feed(Parameters):
-    """Force from the surface on the bit."""
+    """Force from the surface on the bit or on the casing above it."""
 
     force: float = quantity(
         2500.0,
         "N",
-        "feed force F_S on the bit, down positive",
+        "feed force F_S, down positive",
         FEED_ON,
         typical=FEED,
         ge=-1e9,
         le=1e9,
+    )
+    on: str = choice(
+        "bit",
+        ("bit", "casing"),
+        "what it pushes: the bit, or the casing, whose recoil it balances first",
+        FEED_ON,
+    )
+    casing_mass: float = quantity(
+        0.0, "kg", "mass whose weight holds the casing down too", FEED_ON_CASING, ge=0, le=1e6
     )
 
 
@@ -284,12 +294,13 @@ class Start(Parameters):
     )
 
 
-# Of the scene itself, beside its title: no solver takes it and no FMU has it.
+# Of the scene itself, beside its title.
 HOLE_DIAMETER: ParameterRow = dataclasses.replace(
     quantity(
         None,
         "m",
-        "diameter of the hole, which tells the specific energy; left out: that is not known",
+        "diameter of the hole, which tells specific energy and advance by breaking; "
+        "left out: not known",
         typical=HOLE,
         gt=0,
         le=10,
@@ -453,12 +464,9 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
             raise ValueError(f"component {one.name}: there is a group or a switch of this name")
         if both := set(one.parameters) & set(one.state):
             raise ValueError(f"component {one.name}: {both.pop()} is a parameter and a field")
-        switches[one.name] = flag(False, one.description)
-        needs: Needs = {f"effects.{one.name}": (True,)}
-        fields = {
-            name: quantity(default, unit, description, needs, ge=lower, le=upper)
-            for name, (default, unit, description, lower, upper) in one.parameters.items()
-        }
+        switches[one.name] = flag(False, one.description, dict(one.needs))
+        needs: Needs = {f"effects.{one.name}": (True,), **one.needs}
+        fields = {name: _parameter(*described, needs) for name, described in one.parameters.items()}
         if fields:
             name_of_class = one.name.title().replace("_", "") + "Group"
             groups[one.name] = _group(name_of_class, Parameters, one.description, fields)
@@ -467,6 +475,16 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
     for key, group in groups.items():
         group.key = key
     return groups
+
+
+def _parameter(
+    default: Any, unit: str, description: str, lower: float, upper: float, needs: Needs
+) -> Any:
+    """Field of a component's parameter: a flag, a whole number or a number."""
+    if isinstance(default, bool):
+        return flag(default, description, needs)
+    kind = count if isinstance(lower, int) else quantity
+    return kind(default, unit, description, needs, ge=lower, le=upper)
 
 
 def _group(
@@ -485,7 +503,7 @@ globals().update({group.__name__: group for group in GROUPS.values()})
 @cache
 def parameter_table() -> tuple[ParameterRow, ...]:
     """Return a row for each parameter, in the order of a scene file."""
-    return tuple(table_of(GROUPS))
+    return (HOLE_DIAMETER, *table_of(GROUPS))
 
 
 def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
@@ -499,8 +517,8 @@ def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
 
 @cache
 def rows_by_key() -> Mapping[str, ParameterRow]:
-    """Return the rows of `parameter_table` by their dotted keys, and `HOLE_DIAMETER`."""
-    return {row.key: row for row in (HOLE_DIAMETER, *parameter_table())}
+    """Return the rows of `parameter_table` by their dotted keys."""
+    return {row.key: row for row in parameter_table()}
 
 
 def find_row(key: str) -> ParameterRow | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from percussion_model.physics.records import RockKind
+from percussion_model.physics.records import Cuttings, RockKind
 from percussion_model.scene.numbers import Numbers
 
 # What the choices of the parameter table mean, in their order.
@@ -82,11 +82,16 @@ def fill_power(p: Any, values: Any) -> None:
 
 
 def fill_cuttings(p: Any, values: Any) -> None:
-    """Fill the parameters of cuttings that stay in the crater: with them loading has two lines."""
+    """Fill the parameters of what stays in the crater: with it loading has two lines."""
     share, exponent = values.rock_removed_share, values.rock_removal_exponent
     stay = share < 1.0 or exponent != 1.0
     is_crushed = ROCKS[values.effects_rock] == RockKind.BILINEAR
-    p["cuttings"] = is_crushed and values.effects_cuttings != 0 and stay
+    p["cuttings"] = Cuttings.NONE
+    if is_crushed and values.effects_cuttings != 0 and stay:
+        p["cuttings"] = Cuttings.FLUSHED
+    met_again = values.effects_rotation != 0 and values.rotation_old_line != 0
+    if is_crushed and met_again and values.rotation_renewal_length > 0.0:
+        p["cuttings"] = Cuttings.INDEXED
     p["removed_share"], p["removal_exponent"] = share, exponent
-    if p["cuttings"]:
+    if p["cuttings"] != Cuttings.NONE:
         p["power"] = 1

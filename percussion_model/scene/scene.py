@@ -425,7 +425,9 @@ class Scene:
             value = self[row.key]
             if value is None or not (self.matters(row.key) or row.key in given):
                 continue
-            group, _, name = row.key.partition(".")
+            group, _, name = row.key.rpartition(".")
+            if not group:  # the diameter of the hole, which stands in the head
+                continue
             tree.setdefault(group, {})[name] = _as_tables(value)
         return tree
 

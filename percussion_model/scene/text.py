@@ -141,7 +141,7 @@ def commented_scene(
     lines += _commented_value(HOLE_DIAMETER, head.get(HOLE_DIAMETER.key), False)
     group = ""
     for row in parameter_table():
-        if "*" in row.key:
+        if "*" in row.key or row is HOLE_DIAMETER:
             continue
         if row.kind == "sections":
             lines += _commented_sections(row, values[row.key], row.key in hidden)

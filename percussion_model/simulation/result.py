@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from percussion_model.components import COMPONENTS
+from percussion_model.components import FORCES
 from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
@@ -329,7 +329,7 @@ def _fall(result: Result) -> dict[str, float]:
     if len(touching):
         found["first_contact"] = float(modes["time"][touching[0]])
         left = np.flatnonzero(modes["kind"][touching[0] :] == Mode.FF) + touching[0]
-        pushed = any(scene[f"effects.{one.name}"] for one in COMPONENTS)
+        pushed = any(scene[f"effects.{one.name}"] for one in FORCES)
         if len(left) and not pushed and scene.piston.model == "absent":  # a flight undisturbed
             found["rebound_velocity"] = _leaving_velocity(result, modes, int(left[0]))
         if modes["kind"][-1] == Mode.SS:

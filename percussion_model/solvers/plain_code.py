@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from percussion_model.components import COMPONENTS
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.kernel import composed, when_compiling
 from percussion_model.scene import bars, contradictions, rock_law, solver_choice
 from percussion_model.solvers import setup
@@ -36,9 +36,11 @@ _FUNCTIONS = (
     rock_law.fill_power,
     rock_law.fill_rock,
     contradictions.find_contradiction,
+    contradictions._in_breaking,
     contradictions._in_string,
     contradictions._in_accuracy,
     setup.kelvin_voigt_time,
+    setup.fill_loads,
     setup.fill_parameters,
     setup.fill_start,
     setup.elastic_piston,
@@ -81,14 +83,19 @@ def _and_constant(before: Callable, field: str, value: float) -> Callable:
     return fill
 
 
-def _and_component(before: Callable, name: str, numbers: Callable) -> Callable:
-    switch, present = f"effects_{name}", f"with_{name}"
+def _and_component(before: Callable, one: Component, numbers: Callable) -> Callable:
+    switch, present = f"effects_{one.name}", f"with_{one.name}"
+    pushes, moves = one.force is not None, setup.follows_blows(one)
 
     @composed
     def fill(p: Any, values: Any) -> None:
         before(p, values)
         if values[switch]:
-            p["effects"] = p[present] = 1
+            p[present] = 1
+            if pushes:
+                p["effects"] = 1
+            if moves:
+                p["places"] = 1
             numbers(p, values)
 
     return fill
@@ -100,13 +107,15 @@ def _parameters(p, values):
         numbers = _nothing
         for name in one.parameters:
             numbers = _and_number(numbers, f"{one.name}_{name}", f"{one.name}_{name}")
-        fill = _and_component(fill, one.name, numbers)
+        fill = _and_component(fill, one, numbers)
     return lambda p, values: fill(p, values)
 
 
 def _states(s, values):
     fill = _nothing
     for one in COMPONENTS:
+        for name in one.inputs:
+            fill = _and_number(fill, f"{one.name}_{name}", f"{one.name}_{name}")
         for field, (_, _, start) in zip(one.fields, one.state.values(), strict=True):
             if isinstance(start, str):
                 fill = _and_number(fill, field, f"{one.name}_{start}")

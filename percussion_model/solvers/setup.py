@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.components import COMPONENTS
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.records import DRIVES, TURNS, Mode, Piston
 from percussion_model.scene.bars import bar_mass, bar_transit_time
+from percussion_model.scene.contradictions import ON_CASING
 from percussion_model.scene.numbers import Numbers
 from percussion_model.scene.rock_law import fill_rock, rock_numbers
 
@@ -92,15 +93,35 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["piston"] = PISTONS[values.piston_model]
     p["drive"] = DRIVES[values.effects_drive]
     fill_rock(p, numbers)
+    fill_loads(p, values)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
     fill_components(p, values)
+
+
+def fill_loads(p: Any, values: Any) -> None:
+    """Fill where the feed acts, and the area of the hole."""
+    p["on_casing"] = values.effects_feed != 0 and values.feed_on == ON_CASING
+    p["casing_weight"] = values.feed_casing_mass * p["gravity"]
+    p["hole_area"] = 0.0
+    if values.hole_diameter > 0.0:
+        p["hole_area"] = 0.25 * math.pi * values.hole_diameter * values.hole_diameter
+
+
+def follows_blows(one: Component) -> bool:
+    """Whether a component needs to know of drilling cycles and blows."""
+    kernels = (one.gained, one.end_loading, one.kept, one.next_blow)
+    return any(kernel is not None for kernel in kernels)
 
 
 def fill_components(p: Any, values: Any) -> None:
     """Fill the parameters of the components that are on."""
     for one in COMPONENTS:
         if getattr(values, f"effects_{one.name}"):
-            p["effects"] = p[f"with_{one.name}"] = 1
+            p[f"with_{one.name}"] = 1
+            if one.force is not None:
+                p["effects"] = 1
+            if follows_blows(one):
+                p["places"] = 1
             for name in one.parameters:
                 p[f"{one.name}_{name}"] = getattr(values, f"{one.name}_{name}")
 
@@ -108,6 +129,8 @@ def fill_components(p: Any, values: Any) -> None:
 def start_components(s: Any, values: Any) -> None:
     """Fill the states of components at time zero, whether they are on or not."""
     for one in COMPONENTS:
+        for name in one.inputs:
+            s[f"{one.name}_{name}"] = getattr(values, f"{one.name}_{name}")
         for field, (_, _, start) in one.state.items():
             is_name = isinstance(start, str)
             value = getattr(values, f"{one.name}_{start}") if is_name else start

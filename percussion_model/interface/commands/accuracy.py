@@ -38,6 +38,7 @@ def accuracy(
     ] = False,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -66,7 +67,7 @@ def accuracy(
     from percussion_model.verification.accuracy.study import solvers_of
 
     chosen = [
-        (path.stem, common.load_scene(path, settings=settings, is_run=False, rock=rock))
+        (path.stem, common.load_scene(path, settings=settings, is_run=False, rock=rock, bit=bit))
         for path in scenes or ()
     ]
     if not chosen:

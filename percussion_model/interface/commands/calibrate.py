@@ -76,6 +76,7 @@ def calibrate(
     cells: common.Cells = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     json_file: common.JsonFile = None,
 ) -> None:
     """Fit the rock of a scene to a slow test, drop tests and single numbers, all together.
@@ -98,7 +99,7 @@ def calibrate(
         common.check_file(option, path)
         if path is not None:
             common.refuse_existing(path, force)
-    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock, bit=bit)
     slow = [read_curve(path) for path in curve or ()]
     drops = [read_drop(word, gauge) for word in drop or ()]
     numbers = [read_reading(word) for word in measured or ()]

@@ -89,6 +89,15 @@ RockName = Annotated[
         "wins. `percussion rocks` lists them.",
     ),
 ]
+BitName = Annotated[
+    str | None,
+    typer.Option(
+        "--bit",
+        metavar="NAME",
+        help="Drill with a button bit, as dth-140, that turns and breaks rock. `percussion bits` "
+        "lists them.",
+    ),
+]
 _ACCURACY = "Wanted relative error of the rate, in place of cells."
 Accuracy = Annotated[
     float | None, number_option("--accuracy", "ERROR", "solver.accuracy", _ACCURACY)
@@ -145,6 +154,7 @@ def load_scene(
     check: bool | None = None,
     is_run: bool = True,
     rock: str | None = None,
+    bit: str | None = None,
 ) -> Scene:
     """Read a scene (a file, a preset, else the reference), and apply what the command line changes.
 
@@ -154,7 +164,8 @@ def load_scene(
     from percussion_model.scene.text import read_setting
 
     scene = Scene() if path is None else Scene.from_toml(path)
-    changes: dict[str, Any] = rock_changes(rock)
+    scene = with_bit(scene, bit)
+    changes: dict[str, Any] = rock_changes(rock, scene)
     changes |= dict(read_setting(text) for text in settings or ())
     if solver is not None:
         scene = scene.computed_by(solver, **changes)
@@ -171,24 +182,35 @@ def load_scene(
     return scene
 
 
-def rock_changes(text: str | None) -> dict[str, Any]:
+def with_bit(scene: Scene, name: str | None) -> Scene:
+    """Return the scene with the bit that --bit names, if any."""
+    from percussion_model.scene.bits import bit
+
+    return scene if name is None else scene.replace(**bit(name).parameters)
+
+
+def rock_changes(text: str | None, scene: Scene) -> dict[str, Any]:
     """Law and numbers of the rock that --rock names, by their keys; none where it is left out.
 
-    Hint at the number of buttons where none is asked for.
+    Hint at the number of buttons where none is asked for, or another one than the bit has.
     """
     from percussion_model.scene.rocks import read_rock
+    from percussion_model.scene.rocks.breaking import parameters_under
 
     if text is None:
         return {}
     rock = read_rock(text)
-    if rock.asked is None and rock.buttons is not None:
+    own = scene["breaking.buttons"] if scene["effects.breaking"] else None
+    if own is not None and rock.asked not in (None, own):
+        hint("--rock", f"{text} takes a bit of {rock.asked} buttons in place of {own}")
+    if own is None and rock.asked is None and rock.buttons is not None:
         many = "button" if rock.buttons == 1 else "buttons"
         hint(
             "--rock",
             f"rock {rock.name}: its stiffness is that of {rock.buttons} {many}: for a bit of 10 "
             f"ask for {rock.name}:10",
         )
-    return rock.parameters
+    return parameters_under(rock, scene)
 
 
 # Parameters of which this process has hinted.

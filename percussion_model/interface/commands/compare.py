@@ -25,6 +25,7 @@ def compare(
     settle: common.Settle = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -37,7 +38,7 @@ def compare(
     from percussion_model.interface.terminal import show_comparison
 
     asked = None if solvers is None else read_solvers(solvers)
-    chosen = common.load_scene(scene, settings=settings, is_run=False, rock=rock)
+    chosen = common.load_scene(scene, settings=settings, is_run=False, rock=rock, bit=bit)
     names = asked or usual_solvers(chosen)
     for name in names:
         chosen.computed_by(name)  # refuses before anything is claimed or compiled

@@ -31,6 +31,7 @@ def effects(
     cells: common.Cells = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     out: common.OutOrDefault = None,
     json_file: common.JsonFile = None,
     force: common.Force = False,
@@ -43,7 +44,7 @@ def effects(
     from percussion_model.analysis.effect_study import by_one_solver, study_effects
     from percussion_model.interface.progress import progress
 
-    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock, bit=bit)
     common.check_json(json_file)
     if figures:
         claimed = common.claim(

@@ -25,6 +25,7 @@ def explore(
     ] = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     solver: common.SolverName = None,
     port: Annotated[
         int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0 takes a free one.")
@@ -42,7 +43,7 @@ def explore(
         raise common.refusal(f"no page, since {common.needs_extra(error, 'report')}") from None
     from percussion_model.interface.explore.response import refuse_scene, respond
 
-    scenes = _scenes(scene, solver, settings, rock)
+    scenes = _scenes(scene, solver, settings, rock, bit)
     first = next(iter(scenes.values()))()
     refuse_scene(first)
     try:
@@ -61,15 +62,19 @@ def explore(
 
 
 def _scenes(
-    path: Path | None, solver: str | None, settings: list[str] | None, rock: str | None
+    path: Path | None,
+    solver: str | None,
+    settings: list[str] | None,
+    rock: str | None,
+    bit: str | None,
 ) -> dict[str, Callable[[], Scene]]:
     """Scenes to start from, by name; the first is shown."""
     from percussion_model.scene.hammers import hammer, hammers
     from percussion_model.scene.scene import Scene
 
-    own = common.load_scene(path, solver, settings=settings, rock=rock)
+    own = common.load_scene(path, solver, settings=settings, rock=rock, bit=bit)
     found: dict[str, Callable[[], Scene]] = {}
-    if path is not None or settings or solver or rock:
+    if path is not None or settings or solver or rock or bit:
         found[OWN] = lambda: own
     found[REFERENCE] = Scene
     for name in hammers():

@@ -22,6 +22,10 @@ SHOWN = {
     "rock.reference_penetration": ("reference penetration", "mm", 1e-3),
     "rock.unloading_exponent": ("unloading exponent", "", 1.0),
     "strength": ("strength", "MPa", 1e6),
+    "breaking.crushing_energy": ("crushing energy", "MJ/m^3", 1e6),
+    "breaking.threshold": ("threshold of a button", "J", 1.0),
+    "rotation.renewal_length": ("renewal length", "mm", 1e-3),
+    "rotation.friction": ("friction of buttons", "", 1.0),
 }
 SECOND_HAND = "*"
 HEADINGS = (
@@ -35,9 +39,10 @@ NOTES = (
     "In brackets is the interval that the number is believed to lie in. Kinds: fitted to measured "
     "or to computed numbers of others; derived from the strength of the rock; assumed, as no "
     "source has it; * is second hand.",
-    "A bit of N buttons is about N times as stiff as one: NAME:N asks for it. The law power has "
-    "the stiffness of one, at its reference penetration. The energy barrier stays that of the "
-    "scene.",
+    "A bit of N buttons on flat rock is about N times as stiff as one: NAME:N asks for it. With "
+    "effects.breaking the buttons are those of the bit, on the bottom that it has drilled: half as "
+    "stiff. The law power has the stiffness of one, at its reference penetration. The energy "
+    "barrier stays that of the scene.",
 )
 
 
@@ -93,7 +98,10 @@ def details(rock: Rock) -> Iterable[tuple[str, str]]:
     yield "Law", rock.law
     if rock.asked is not None:
         yield "Buttons", f"{rock.asked}; the reason behind the stiffness is for {rock.buttons}"
-    for one in (*rock.numbers, *([rock.strength] if rock.strength else [])):
+    from percussion_model.scene.rocks.breaking import breaking_numbers
+
+    strength = [rock.strength] if rock.strength else []
+    for one in (*rock.numbers, *strength, *breaking_numbers(rock)):
         name, unit, _ = SHOWN[one.key]
         told = f"{interval_text(one)} {unit}".rstrip()
         yield name.capitalize(), f"{told}, {kind_text(one)}: {one.why}"

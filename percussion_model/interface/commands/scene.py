@@ -29,6 +29,7 @@ def run(
     error_estimate: common.ErrorEstimate = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     trace: Annotated[
         float | None,
         typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT, in s."),
@@ -45,7 +46,7 @@ def run(
     from percussion_model.interface.progress import progress, progress_bar
     from percussion_model.simulation.simulate import simulate
 
-    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
+    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock, bit=bit)
     common.check_outputs(out, json_file)
     made_from = _made_from(chosen, duration, settle)
     made_from |= {"trace": trace, "error_estimate": error_estimate}
@@ -90,6 +91,7 @@ def settled(
     cells: common.Cells = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     tolerance: common.Tolerance = 1e-4,
     most_time: Annotated[
         float,
@@ -103,7 +105,7 @@ def settled(
     from percussion_model.interface.terminal import show_settled
 
     common.check_json(json_file)
-    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock, bit=bit)
     with progress("preparing") as report:
         found = run_until_settled(
             chosen,
@@ -125,6 +127,7 @@ def explain(
     check: common.Check = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     json_file: common.JsonFile = None,
 ) -> None:
     """Tell what a scene computes, how, and what the run will cost."""
@@ -132,7 +135,7 @@ def explain(
     from percussion_model.interface.progress import progress
     from percussion_model.interface.terminal import show_explanation
 
-    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock)
+    chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock, bit=bit)
     common.check_json(json_file)
     with progress("trying the first blows"):
         found = forecast(chosen)
@@ -205,6 +208,7 @@ def new(
         typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock."),
     ] = "hammer",
     rock: common.RockName = None,
+    bit: common.BitName = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write a commented scene to start from: the reference hammer, or another."""
@@ -224,7 +228,8 @@ def new(
         raise common.refusal("--rods needs --hammer: one of the top hammers")
     else:
         scene = Scene(title=_NEW_TITLE)
-    if changes := common.rock_changes(rock):
+    scene = common.with_bit(scene, bit)
+    if changes := common.rock_changes(rock, scene):
         scene = scene.replace(**changes)
     scene.to_toml(file, comments=True)
     typer.echo(f"wrote {file}")

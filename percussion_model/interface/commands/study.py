@@ -49,6 +49,7 @@ def study(
     cells: common.Cells = None,
     settings: common.Settings = None,
     rock: common.RockName = None,
+    bit: common.BitName = None,
     tolerance: common.Tolerance = 1e-4,
     scatter: Annotated[
         float,
@@ -94,7 +95,7 @@ def study(
         ends = {key: (float(min(values)), float(max(values))) for key, values in axes.items()}
         points = latin_hypercube(ends, samples, seed, logarithmic)
     common.check_outputs(out, None)
-    chosen = common.load_scene(scene, solver, cells, settings, rock=rock)
+    chosen = common.load_scene(scene, solver, cells, settings, rock=rock, bit=bit)
     for key, column in zip(points.keys, points.values.T, strict=True):
         common.hint(key, hint_of(key, column.tolist()))
     try:

@@ -74,6 +74,8 @@ class Rock:
         `cited`, `published`, `doi` and `read_in`.
     asked : int or None
         Buttons of the bit that it was asked for.
+    breaking : tuple of Number
+        What is known of its own craters, by keys of `[breaking]` and `[rotation]`.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Rock:
     button_radius: float | None = None
     strength: Number | None = None
     asked: int | None = None
+    breaking: tuple[Number, ...] = ()
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -202,6 +205,10 @@ def _same(value: float, other: float) -> bool:
 
 def _read(name: str, tree: Mapping[str, Any]) -> Rock:
     """Rock of a file; these files are our own, and a test reads them all."""
-    numbers = tuple(Number(key, **one) for key, one in tree["parameters"].items())
+    numbers, breaking = (
+        tuple(Number(key, **one) for key, one in tree.get(part, {}).items())
+        for part in ("parameters", "craters")
+    )
     strength = Number("strength", **tree["strength"]) if "strength" in tree else None
-    return Rock(name, **tree["rock"], numbers=numbers, strength=strength, source=tree["source"])
+    known = {"strength": strength, "breaking": breaking, "source": tree["source"]}
+    return Rock(name, **tree["rock"], numbers=numbers, **known)

@@ -48,6 +48,7 @@ def change_contact(par, s, w, c, blows, events):
         if starts_blow(par, s, s.time):
             force = standstill_force(s, s.time, s.i_bit)
             start_blow(par, s, blows, s.time, s.v_p, bit_position(s), force)
+            move_datum(par, s, w)
         s.closed = 1
         s.e_overshoot -= 0.5 * par.k_c * s.gap * s.gap
         close_gap(s, events, s.time, -s.gap_rate)

@@ -158,6 +158,7 @@ WAVE_STATE = np.dtype(
         ("step", "i8"),  # number of steps done
         ("cuts", "i8"),  # steps cut since the last closure below the piston
         ("t_base", "f8"),  # time of step 0 if none had been cut [s]
+        ("held_feed", "f8"),  # feed force on the bit in this step [N]
         ("v_c", "f8"),  # velocity of the casing [m/s]
         ("u_c", "f8"),  # its displacement [m]
         ("x_c", "f8"),  # shortening of the damper since the start [m]

@@ -10,6 +10,7 @@ from percussion_model.physics.blows import (
     start_blow,
     starts_blow,
 )
+from percussion_model.physics.feed import feed_on_bit
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import (
     book_on_bit,
@@ -131,7 +132,8 @@ def accelerations(par, s, chain, waves, push):
         damper = damper_force(par, s.x_c, speed, bodies[struck, INV_MASS])
         came[ACCELERATION, struck] += damper * bodies[struck, INV_MASS]
     else:
-        came[ACCELERATION, struck] += s.feed * bodies[struck, INV_MASS]
+        s.held_feed = feed_on_bit(par, s)
+        came[ACCELERATION, struck] += s.held_feed * bodies[struck, INV_MASS]
     if par.effects == 1:
         came[ACCELERATION, bit] += s.f_on_bit * bodies[bit, INV_MASS]
     if par.piston == Piston.ELASTIC:
@@ -404,7 +406,7 @@ def move_bars(par, s, chain, waves, damper, tau, rest):
         book_on_bit(par, s, path)
     s.v_b = waves.bars[VELOCITY, bit]
     if par.damper == 0:
-        s.e_feed += s.feed * held
+        s.e_feed += s.held_feed * held
         return held
     recoil = drive_force(par, s)
     v1 = s.v_c + (s.feed - damper - recoil) / par.casing_mass * tau

@@ -35,6 +35,7 @@ def _demands(scene: Any) -> Iterator[tuple[str, str, bool]]:
     yield "paper", "effects.standstill_tension must not be 'paper'", pulls
     left = effects.cuttings and scene.matters("effects.cuttings")
     yield "cuttings", "effects.cuttings must be false", left
+    yield "casing", "feed.on must not be 'casing'", effects.feed and scene.feed.on == "casing"
     for one in COMPONENTS:
         yield one.name, f"effects.{one.name} must be false", getattr(effects, one.name)
 

@@ -1,0 +1,120 @@
+"""Rotation of the bit: what it leaves of the craters, its torque and its motor.
+
+From blow to blow buttons at the mean radius r turn on by an arc s. Craters keep of the energy
+that they have taken the share exp(-s/lambda) (docs/model.md, eq. 20g). The torque lifts the bit
+out of its craters, by c a blow against the mean force F, and rubs the buttons on the rock, which
+only the static force F_0 presses on it between blows,
+
+    T = r (F c/s + mu F_0)
+
+(eq. 20h). The motor's speed falls with the torque, to zero where it stalls.
+"""
+
+from __future__ import annotations
+
+from percussion_model.components import Component
+from percussion_model.physics.elementary import exp
+from percussion_model.physics.kernel import inlined
+
+
+@inlined
+def arc(par, s, period):
+    """Arc at the mean radius of the buttons in a time [m]."""
+    return par.rotation_mean_radius * s.rotation_turning_speed * period
+
+
+@inlined
+def fading(par):
+    """Arc over which craters lose 63 % of their depth [m]."""
+    return par.rotation_renewal_length * (par.exponent + 1.0)
+
+
+@inlined
+def kept(par, s, period):
+    """Share of their depth that craters keep after a period."""
+    length = fading(par)
+    return exp(-arc(par, s, period) / length) if length > 0.0 else 0.0
+
+
+@inlined
+def motor_speed(par, s, torque):
+    """Speed of the motor under a torque [rad/s]."""
+    stall, full = par.rotation_stall_torque, par.rotation_full_torque
+    if stall == 0.0 or torque <= full:
+        return s.rotation_speed
+    return s.rotation_speed * max(stall - torque, 0.0) / (stall - full) if stall > full else 0.0
+
+
+@inlined
+def next_blow(par, s, period, kept, rest, push, climb):
+    """Torque of the blow that has ended, and the speed of the next."""
+    way, radius = arc(par, s, period), par.rotation_mean_radius
+    slope = climb / way if way > 0.0 else 0.0
+    if way == 0.0 and fading(par) > 0.0:
+        slope = s.pit / fading(par)  # on which it would begin to climb
+    rubbing = par.rotation_friction * max(rest, 0.0)
+    needed = radius * (max(push, 0.0) * slope + rubbing)
+    s.rotation_needed_torque = needed
+    stall = par.rotation_stall_torque
+    s.rotation_torque = min(needed, stall) if stall > 0.0 else needed
+    s.rotation_angle += s.rotation_turning_speed * period
+    s.rotation_index = way
+    s.e_turning += rubbing * way
+    s.e_friction += rubbing * way
+    follows = 1.0
+    if par.rotation_response > 0.0:
+        follows = 1.0 - exp(-period / par.rotation_response)
+    off = motor_speed(par, s, needed) - s.rotation_turning_speed
+    s.rotation_turning_speed += follows * off
+
+
+COMPONENT = Component(
+    "rotation",
+    "the bit turns: rock that was met before answers as left, and a torque is needed",
+    {
+        "speed": (4.0, "rad/s", "speed of the rotation, of its motor without load", 0.0, 1e4),
+        "mean_radius": (None, "m", "mean radius on which the buttons are", 1e-4, 10.0),
+        "renewal_length": (
+            2e-3,
+            "m",
+            "lambda: arc at the mean radius after which 63 % of the energy of craters is to be "
+            "crushed anew; 0: rock is always fresh",
+            0.0,
+            1.0,
+        ),
+        "old_line": (
+            False,
+            "-",
+            "rock met again answers on its old line of unloading; else it is crushed again, which "
+            "breaks nothing",
+            0,
+            1,
+        ),
+        "friction": (0.4, "-", "mu: friction of buttons on rock between blows", 0.0, 10.0),
+        "stall_torque": (
+            0.0,
+            "N m",
+            "torque at which the motor stalls; 0: it never does",
+            0.0,
+            1e9,
+        ),
+        "full_torque": (0.0, "N m", "torque up to which the motor holds its speed", 0.0, 1e9),
+        "response": (0.1, "s", "time in which the speed follows; 0: from blow to blow", 0.0, 1e3),
+    },
+    state={
+        "angle": ("rad", "angle turned since the start, up to the present blow", 0.0),
+        "turning_speed": ("rad/s", "speed of the bit's rotation", "speed"),
+        "torque": ("N m", "torque of the rotation in the last blow", 0.0),
+        "needed_torque": ("N m", "torque that rotation needs, more than the motor's in a jam", 0.0),
+        "index": ("m", "arc at the mean radius in the last blow", 0.0),
+    },
+    inputs=("speed",),
+    kept=kept,
+    next_blow=next_blow,
+    of_blow=("torque", "index"),
+    entries={
+        "turning": ("work", "work of the rotation against the friction of the buttons"),
+        "friction": ("dissipated", "friction of buttons that turn on the rock"),
+    },
+    needs={"effects.rock": ("bilinear", "power")},
+)

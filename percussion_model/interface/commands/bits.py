@@ -1,0 +1,85 @@
+"""Command `bits`: the button bits that --bit takes, with intervals and sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands import common
+
+if TYPE_CHECKING:
+    from percussion_model.scene.bits import ButtonBit
+    from percussion_model.scene.rocks import Number
+
+HEADINGS = (
+    "bit", "diameter, mm", "buttons", "on the gauge", "button diameter, mm", "mean radius, mm",
+    "rpm by rule",
+)  # fmt: skip
+MM, RPM = 1e3, 9.549296585513721
+NOTE = (
+    "In brackets is the interval that a number is believed to lie in. Counts were read second "
+    "hand; the mean radius of the buttons follows from them. The rule is 300 by the diameter in "
+    "inches. `percussion bits NAME` tells all of one."
+)
+
+
+def bits(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="One of them; left out: lists all.")
+    ] = None,
+    json_file: common.JsonFile = None,
+) -> None:
+    """List the button bits that --bit takes: diameter, buttons, sources; or tell of one."""
+    from percussion_model.interface.tables import airy_table, named_table, print_notes, print_table
+    from percussion_model.scene.bits import bit
+    from percussion_model.scene.bits import bits as names
+
+    common.check_json(json_file)
+    chosen = [bit(one) for one in (names() if name is None else [name])]
+    common.write_json(
+        json_file, {one.name: asdict(one) | {"parameters": one.parameters} for one in chosen}
+    )
+    if json_file == "-":
+        return
+    if name is not None:
+        print_table(named_table(details(chosen[0]), chosen[0].title))
+        return
+    table = airy_table(HEADINGS, HEADINGS[:1], pad_edge=False)
+    for one in chosen:
+        table.add_row(*cells(one))
+    print_table(table)
+    print_notes(["", NOTE])
+
+
+def _interval(one: Number, scale: float = 1.0) -> str:
+    value, low, high = (f"{scale * number:.3g}" for number in (one.value, one.low, one.high))
+    return f"{value} ({low} to {high})"
+
+
+def _sizes(one: ButtonBit) -> str:
+    """Diameters of the buttons [mm]."""
+    sizes = sorted({one.gauge_button_diameter, one.front_button_diameter}, reverse=True)
+    return " and ".join(f"{MM * size:g}" for size in sizes)
+
+
+def cells(one: ButtonBit) -> tuple[str, ...]:
+    """Return the texts of a row, by `HEADINGS`."""
+    return (
+        one.name, f"{MM * one.diameter:g}", _interval(one.buttons), str(one.gauge_buttons),
+        _sizes(one), _interval(one.mean_radius, MM), f"{RPM * one.usual_speed:.0f}",
+    )  # fmt: skip
+
+
+def details(one: ButtonBit) -> Iterable[tuple[str, str]]:
+    """Go through all that is known of a bit, as names and texts."""
+    yield "Diameter", f"{MM * one.diameter:g} mm"
+    yield "Buttons", f"{_interval(one.buttons)}, {one.gauge_buttons} of them on the gauge"
+    yield "Why", one.buttons.why
+    yield "Button diameter", f"{_sizes(one)} mm"
+    yield "Mean radius", f"{_interval(one.mean_radius, MM)} mm: {one.mean_radius.why}"
+    yield "Rotation by rule", f"{RPM * one.usual_speed:.0f} rpm"
+    yield "Source", one.source["cited"]
+    yield "Read in", one.source["read_in"]

@@ -1,0 +1,56 @@
+"""Feed on the bit, or on a casing that passes on what the drive leaves of it.
+
+A casing rests on the shoulder of the bit and takes the reaction of the drive, whose mean over a
+blow the feed must balance (docs/model.md, eq. 3a). Where it does not, the casing lifts off until
+the drive has no more force than is held.
+"""
+
+from __future__ import annotations
+
+from percussion_model.physics.kernel import inlined
+from percussion_model.physics.records import DriveKind
+
+# A drive throttled further does not tell its recoil.
+LEAST_THROTTLE = 1e-2
+
+
+@inlined
+def held(par, s):
+    """Force that holds the casing down [N]."""
+    return s.feed + par.casing_weight
+
+
+@inlined
+def full_recoil(par, s):
+    """Mean force on the casing of a drive that is not throttled, up positive [N]."""
+    if par.drive == DriveKind.PRESSURE:
+        return s.recoil_share * s.drive_force
+    return s.recoil_share
+
+
+@inlined
+def throttle(par, s):
+    """Share of its force that the pressure law has: as much as lifts no casing further."""
+    if par.on_casing == 0:
+        return 1.0
+    recoil = full_recoil(par, s)
+    return min(max(held(par, s), 0.0) / recoil, 1.0) if recoil > 0.0 else 1.0
+
+
+@inlined
+def feed_on_bit(par, s):
+    """Feed force on the bit [N]."""
+    if par.on_casing == 0:
+        return s.feed
+    return max(held(par, s) - full_recoil(par, s), 0.0)
+
+
+@inlined
+def note_recoil(par, s, push):
+    """Take the recoil from the mean force of the drive over a blow [N]."""
+    if par.drive != DriveKind.PRESSURE:
+        s.recoil_share = max(push, 0.0)
+    else:
+        full = throttle(par, s) * s.drive_force
+        if full > LEAST_THROTTLE * s.drive_force:
+            s.recoil_share = max(push / full, 0.0)

@@ -1,0 +1,111 @@
+"""What breaking and rotation need of a rock, and the stiffness of a bit on its own bottom.
+
+Where no craters of a rock are known, its crushing energy follows that of two rocks by their
+strength: the specific energy of percussion drilling in nine rocks grows as a + UCS, with
+a = 149 MPa (Paone et al. 1969, second hand; docs/breaking.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from percussion_model.scene.rocks import BUTTONS, STIFFNESS, Number, Rock
+from percussion_model.scene.scene import Scene
+
+ENERGY, THRESHOLD = "breaking.crushing_energy", "breaking.threshold"
+RENEWAL, FRICTION, COUNT = "rotation.renewal_length", "rotation.friction", "breaking.buttons"
+
+# Of the line on which specific energy grows with strength [Pa].
+_OFFSET = 149e6
+# Crushing energy of single craters in two rocks [J/m^3], and the mean of their strengths [Pa].
+_MEASURED, _LOW, _HIGH, _AT = 55e6, 46e6, 65e6, 164e6
+# Where no strength is known.
+_WIDE = (30e6, 90e6)
+# A bit on the bottom that it has drilled touches with some of its buttons: stiffness by that of
+# all buttons on flat rock.
+CONTACT_SHARE = Number(
+    "contact share",
+    0.5,
+    0.4,
+    0.6,
+    "computed",
+    "bottom of a hole of 140 mm as a field of heights under 17 buttons: 11 to 13 of them touch",
+)
+_ASSUMED = (
+    Number(
+        THRESHOLD, 5.0, 2.0, 10.0, "derived",
+        "from craters of 7 J and 50 J on Kuru granite", second_hand=True,
+    ),
+    Number(
+        RENEWAL, 2e-3, 1e-3, 6e-3, "computed",
+        "bottom of a hole of 140 mm under 17 buttons, and makers' speeds of rotation",
+    ),
+    Number(FRICTION, 0.4, 0.2, 0.6, "assumed", "no torque with a known feed was found"),
+)  # fmt: skip
+
+
+def energy_by_strength(strength: float) -> float:
+    """Crushing energy of a volume of craters, by compressive strength [Pa] [J/m^3]."""
+    return _MEASURED * (_OFFSET + strength) / (_OFFSET + _AT)
+
+
+def breaking_numbers(rock: Rock) -> tuple[Number, ...]:
+    """Numbers of a rock for breaking and rotation: its own, else derived or assumed."""
+    own = {one.key: one for one in rock.breaking}
+    return tuple(own.get(one.key, one) for one in (_energy(rock), *_ASSUMED))
+
+
+def _energy(rock: Rock) -> Number:
+    if rock.strength is None:
+        why = "no strength is known; as of granite and limestone, and twice as far to both sides"
+        return Number(ENERGY, _MEASURED, *_WIDE, "assumed", why)
+    low = energy_by_strength(rock.strength.low) * _LOW / _MEASURED
+    high = energy_by_strength(rock.strength.high) * _HIGH / _MEASURED
+    why = "by the strength from craters in granite and limestone"
+    value = energy_by_strength(rock.strength.value)
+    return Number(ENERGY, value, low, high, "derived", why, rock.strength.second_hand)
+
+
+def on_bottom(rock: Rock, buttons: int | None) -> Rock:
+    """The rock under a bit of so many buttons on the bottom that it has drilled.
+
+    Where the buttons behind the rock's numbers are not known, they are those of a whole bit.
+    """
+    if rock.buttons is None:
+        return rock
+    share = CONTACT_SHARE
+    whole = rock.of_buttons(buttons or rock.buttons)
+    numbers = tuple(
+        replace(
+            one,
+            value=share.value * one.value,
+            low=share.low * one.low,
+            high=share.high * one.high,
+        )
+        if one.key == STIFFNESS
+        else one
+        for one in whole.numbers
+    )
+    return replace(whole, numbers=numbers)
+
+
+def numbers_under(rock: Rock, scene: Scene) -> tuple[Number, ...]:
+    """Numbers of a rock that a scene takes, for the bit that it has."""
+    if not scene["effects.breaking"]:
+        return rock.numbers
+    found = on_bottom(rock, rock.asked or scene["breaking.buttons"]).numbers
+    kept = ("breaking.", "rotation.") if scene["effects.rotation"] else ("breaking.",)
+    return (*found, *(one for one in breaking_numbers(rock) if one.key.startswith(kept)))
+
+
+def parameters_under(rock: Rock, scene: Scene) -> dict[str, Any]:
+    """Law and numbers of a rock by their dotted keys, for the bit that a scene has."""
+    if not scene["effects.breaking"]:
+        return rock.parameters
+    buttons = rock.asked or scene["breaking.buttons"]
+    found = on_bottom(rock, buttons).parameters if rock.buttons else rock.parameters
+    found |= {one.key: one.value for one in numbers_under(rock, scene)}
+    if BUTTONS in found:
+        found[BUTTONS] = buttons
+    return found | {COUNT: buttons}
