@@ -66,9 +66,9 @@ LEFT_OUT = {
     "fem.damping_ratio": (-1.0, "-1: by loss.time"),
     "hole_diameter": (0.0, "0: not known"),
     **{
-        f"{one.name}.{name}": (0.0, "0: not given")
+        f"{one.name}.{name}": (0 if isinstance(least, int) else 0.0, "0: not given")
         for one in COMPONENTS
-        for name, (default, *_) in one.parameters.items()
+        for name, (default, _, _, least, _) in one.parameters.items()
         if default is None
     },
 }
