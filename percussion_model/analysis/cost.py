@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from percussion_model.analysis.stationary import MOST_BLOWS
-from percussion_model.scene.rocks import rock_of
+from percussion_model.scene.rocks.breaking import rock_of
 from percussion_model.scene.scales import scales
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.accuracy_control import has_grid, planned_cells, with_cells

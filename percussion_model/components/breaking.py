@@ -5,7 +5,7 @@ Where a blow crushes the energy W, it breaks
     V = eta max(W - max(W_1, N W_0), 0) / e_c
 
 beyond the craters of the energy W_1 that are there already; so the hole gains V by its area, and
-no more than what is pressed in (docs/model.md, eq. 20f).
+no more than what is pressed in (docs/model.md, eq. 20g).
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def gained(par, s, deeper):
     """Advance of the hole by the present loading [m], which presses the buttons in deeper."""
     if par.breaking_crushing_energy == 0.0:
         return deeper
-    before = s.breaking_of_blow
+    before = s.breaking_under_way
     volume = flushed(par, before + broken(par, s)) - flushed(par, before)
     return min(volume / par.hole_area, deeper)
 
@@ -62,7 +62,7 @@ def end_loading(par, s, advance):
     if par.breaking_crushing_energy > 0.0:
         volume = broken(par, s)
         s.breaking_limited += max(volume - advance * par.hole_area, 0.0)
-        s.breaking_of_blow += volume
+        s.breaking_under_way += volume
     s.breaking_crushed += s.crushed
     s.breaking_volume += advance * par.hole_area
 
@@ -72,9 +72,13 @@ def next_blow(par, s, period, kept, rest, push, climb):
     """Move to a place that keeps a share of its craters' depth."""
     taken = max(s.breaking_taken, s.breaking_crushed)
     taken *= exp((par.exponent + 1.0) * log(kept)) if kept > 0.0 else 0.0
-    s.breaking_taken, s.breaking_of_blow, s.breaking_last = taken, 0.0, s.breaking_of_blow
-    # on its old line of unloading rock is crushed from there on, else from nothing
-    s.breaking_crushed = taken if par.rotation_old_line == 1.0 else 0.0
+    s.breaking_taken, s.breaking_under_way, s.breaking_blow_volume = (
+        taken,
+        0.0,
+        s.breaking_under_way,
+    )
+    # rock that is left as it was is crushed from there on, other rock from nothing
+    s.breaking_crushed = taken if par.left == 1 else 0.0
 
 
 COMPONENT = Component(
@@ -119,13 +123,13 @@ COMPONENT = Component(
         "volume": ("m^3", "volume broken since the start", 0.0),
         "crushed": ("J", "energy crushed at this place, of loadings that have ended", 0.0),
         "taken": ("J", "energy whose craters were there when the bit came to this place", 0.0),
-        "of_blow": ("m^3", "volume broken in the blow under way", 0.0),
-        "last": ("m^3", "volume broken in the last blow", 0.0),
+        "under_way": ("m^3", "volume broken in the blow under way", 0.0),
+        "blow_volume": ("m^3", "volume broken in the last blow", 0.0),
         "limited": ("m^3", "volume that flushing and the depth pressed in have cut off", 0.0),
     },
     gained=gained,
     end_loading=end_loading,
     next_blow=next_blow,
-    of_blow=("last",),
+    of_blow=("blow_volume",),
     needs={"effects.rock": ("bilinear", "power")},
 )

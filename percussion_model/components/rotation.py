@@ -1,13 +1,13 @@
 """Rotation of the bit: what it leaves of the craters, its torque and its motor.
 
 From blow to blow buttons at the mean radius r turn on by an arc s. Craters keep of the energy
-that they have taken the share exp(-s/lambda) (docs/model.md, eq. 20g). The torque lifts the bit
+that they have taken the share exp(-s/lambda) (docs/model.md, eq. 20h). The torque lifts the bit
 out of its craters, by c a blow against the mean force F, and rubs the buttons on the rock, which
 only the static force F_0 presses on it between blows,
 
     T = r (F c/s + mu F_0)
 
-(eq. 20h). The motor's speed falls with the torque, to zero where it stalls.
+(eq. 20i). The motor's speed falls with the torque, to zero where it stalls.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ COMPONENT = Component(
             0,
             1,
         ),
-        "friction": (0.4, "-", "mu: friction of buttons on rock between blows", 0.0, 10.0),
+        "friction": (0.8, "-", "mu: friction of buttons on rock between blows", 0.0, 10.0),
         "stall_torque": (
             0.0,
             "N m",

@@ -12,6 +12,7 @@ from typing import Any
 from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.feed import feed_on_bit, note_recoil
 from percussion_model.physics.kernel import composed, inlined, merged
+from percussion_model.physics.power_law import unflushed
 from percussion_model.physics.records import Cuttings
 from percussion_model.physics.rock import is_loading
 
@@ -110,11 +111,13 @@ def move_place(par, s, time):
     if par.places == 0:
         return
     kept = kept_of(par, s, period)
-    if par.cuttings == Cuttings.INDEXED:
+    if par.cuttings == Cuttings.BY_BLOW and s.p_u > 0.0:
+        kept = unflushed(par, s.p_u) / s.p_u
+    if par.left == 1:
         kept = renew(par, s, kept)
     climb = (1.0 - kept) * s.pit
     rest = feed + par.mass_b * par.gravity
     go_on(par, s, period, kept, rest, rest + push + par.mass_p * par.gravity, climb)
     s.e_climb += lift_bit(par, s, feed, push, climb)
-    if par.cuttings != Cuttings.INDEXED:  # what is crushed again counts anew
+    if par.left == 0:  # what is crushed again counts anew
         s.e_refill += lift_bit(par, s, feed, push, s.pit)

@@ -279,8 +279,14 @@ def left_depth(par, depth):
     """
     if par.cuttings == Cuttings.NONE or depth <= 0.0:
         return 0.0
-    if par.cuttings == Cuttings.INDEXED:
+    if par.left == 1:
         return depth
+    return unflushed(par, depth)
+
+
+@kernel
+def unflushed(par, depth):
+    """Depth that flushing leaves of a crater [m]."""
     removed = par.removed_share * depth
     if par.removal_exponent != 1.0:
         removed *= exp((par.removal_exponent - 1.0) * log(depth / CRATER))

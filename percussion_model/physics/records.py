@@ -81,8 +81,9 @@ class Cuttings(IntEnum):
     """What is left of a crater where a drilling cycle begins in it."""
 
     NONE = 0
-    FLUSHED = 1  # what flushing leaves
-    INDEXED = 2  # all: the bit's rotation decides
+    BY_CYCLE = 1  # what flushing leaves
+    BY_BLOW = 2  # all, of which flushing leaves a share from blow to blow
+    INDEXED = 3  # all, of which rotation leaves a share from blow to blow
 
 
 class Column(NamedTuple):

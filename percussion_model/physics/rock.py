@@ -215,7 +215,7 @@ for _one in COMPONENTS:
 
 @inlined
 def hole_depth(par, s):
-    """Depth of the hole (docs/model.md, eqs 20a and 20f) [m]."""
+    """Depth of the hole (docs/model.md, eqs 20a and 20g) [m]."""
     if par.rock != RockKind.BILINEAR:
         return 0.0
     depth = pressed_depth(par, s)

@@ -32,6 +32,7 @@ COMMON_PARAMETERS = [
     ("chipping_force", "f8"),  # of all buttons [N]
     ("chipping_penetration", "f8"),  # over which they chip, 0 where they do not [m]
     ("cuttings", "i8"),  # Cuttings
+    ("left", "i8"),  # 1: during a blow all of them stay
     ("removed_share", "f8"),  # of a crater of 1 mm
     ("removal_exponent", "f8"),
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0

@@ -247,6 +247,12 @@ class RockLaw(Parameters):
     removal_exponent: float = quantity(
         1.0, "-", "removed depth grows as (depth of the crater)^this", CUTTINGS_ON, ge=0, le=4
     )
+    removed_by: str = choice(
+        "blow",
+        ("blow", "cycle"),
+        "flushing acts from blow to blow, or after each drilling cycle as in the paper",
+        CUTTINGS_ON,
+    )
     barrier_damping: float = quantity(
         1e4, "N s/m", "damping C_R of the energy barrier", BARRIER_ON, ge=0, le=1e9
     )

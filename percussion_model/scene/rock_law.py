@@ -11,6 +11,7 @@ from percussion_model.scene.numbers import Numbers
 ROCKS = (
     RockKind.BILINEAR, RockKind.SPRING, RockKind.WALL, RockKind.NONE, RockKind.BILINEAR,
 )  # fmt: skip
+BY_CYCLE = 1  # the choice of `rock.removed_by`
 POWER = 4  # the choice of the power law, which has the modes of the bilinear one
 
 
@@ -88,10 +89,15 @@ def fill_cuttings(p: Any, values: Any) -> None:
     is_crushed = ROCKS[values.effects_rock] == RockKind.BILINEAR
     p["cuttings"] = Cuttings.NONE
     if is_crushed and values.effects_cuttings != 0 and stay:
-        p["cuttings"] = Cuttings.FLUSHED
+        p["cuttings"] = (
+            Cuttings.BY_CYCLE if values.rock_removed_by == BY_CYCLE else Cuttings.BY_BLOW
+        )
     met_again = values.effects_rotation != 0 and values.rotation_old_line != 0
     if is_crushed and met_again and values.rotation_renewal_length > 0.0:
         p["cuttings"] = Cuttings.INDEXED
     p["removed_share"], p["removal_exponent"] = share, exponent
+    p["left"] = p["cuttings"] > Cuttings.BY_CYCLE
+    if p["left"]:
+        p["places"] = 1
     if p["cuttings"] != Cuttings.NONE:
         p["power"] = 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from percussion_model.physics.records import LEDGER_COLUMNS, Column
+from percussion_model.physics.records import BLOW_COLUMNS, LEDGER_COLUMNS, Column
 
 SUMMARY_COLUMNS = (
     Column("rate_of_penetration", "m/s", "advance of the hole over the counted blows, by time"),
@@ -52,6 +52,11 @@ SUMMARY_COLUMNS = (
         "J/m^3",
         "blow energy divided by the volume drilled, a hole of `hole_diameter`; none without it",
     ),
+    *(
+        Column(column.name, column.unit, f"mean of: {column.meaning}")
+        for column in BLOW_COLUMNS
+        if column.of
+    ),
     Column("standard_errors", "as above", "errors of these numbers from the scatter of the blows"),
     Column("errors", "as above", "estimated numerical errors of these numbers, scatter included"),
     Column("energy", "J", "the energy ledger since the start of the run, by its entries"),
@@ -88,7 +93,7 @@ ENERGY_COLUMNS = (
     Column("kinetic", "J", "stored in motion at the end"),
     Column("elastic", "J", "stored in strain at the end"),
     Column("recoverable", "J", "stored in the rock at the end"),
-    Column("input", "J", "sum of drive, feed and gravity"),
+    Column("input", "J", "sum of drive, feed, gravity and what rotation does"),
     Column("stored", "J", "sum of kinetic, elastic and recoverable"),
     Column("dissipated", "J", "sum of all that is taken, but for numerical and overshoot"),
     Column("residual", "J", "what no entry explains"),

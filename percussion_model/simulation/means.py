@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from percussion_model.physics.records import BLOW_COLUMNS
 from percussion_model.simulation.rate import LEAST_BLOWS, ratios_of_sums
 
 # Means over blows, and the columns of the blow table behind them.
@@ -21,7 +22,9 @@ _MEANS = {
     "contacts_per_blow": "contacts",
     "drilling_cycles_per_blow": "drilling_cycles",
     "standstill_bit_force": "standstill_force",
+    **{column.name: column.name for column in BLOW_COLUMNS if column.of},
 }
+_OF_COMPONENTS = tuple(column.name for column in BLOW_COLUMNS if column.of)
 # Means of whole numbers.
 COUNTS = ("contacts_per_blow", "drilling_cycles_per_blow")
 # Ratios of sums over blows: numerator and denominator.
@@ -61,6 +64,8 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     for name, column in _MEANS.items():
         if math.isnan(found[name]):
             found[name] = _mean_of_known(blows[column])
+    # of a component that is off, all are zero
+    found |= {name: math.nan for name in _OF_COMPONENTS if not found[name]}
     found["blow_frequency"] = 1.0 / found["blow_period"]
     found |= {name: _ratio(blows, *columns) for name, columns in _RATIOS.items()}
     return found | {name: _greatest(blows[name]) for name in _GREATEST}

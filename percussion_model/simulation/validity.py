@@ -26,6 +26,12 @@ MOST_RATE = 0.5
 MOST_BARRIER = 0.1
 # A bit that meets no rock for so long, five blows of the reference, is off bottom [s].
 LONGEST_FLIGHT = 0.25
+# Depth that is pressed in may cut off this share of the volume broken.
+MOST_LIMITED = 0.05
+# A casing is held where so much more than the recoil holds it.
+HELD = 1.001
+# Specific energy by strength: below, and above what drills of any kind need.
+LEAST_ENERGY, MOST_ENERGY = 0.3, 5.0
 
 
 def ledger_note(residual: float) -> Iterator[str]:
@@ -142,3 +148,49 @@ def rate_note(rate: float) -> Iterator[str]:
             f"a rate of penetration of {rate:.3g} m/s is no drilling: above {MOST_RATE:g} m/s "
             "the model does not hold"
         )
+
+
+def limit_note(limited: float, volume: float) -> Iterator[str]:
+    """Say that less volume was gained than broken [m^3], where it is much less."""
+    if limited > MOST_LIMITED * (limited + volume):
+        share = 100.0 * limited / (limited + volume)
+        yield (
+            f"{share:.2g} % of the volume broken is not gained: flushing limits it, or more would "
+            "break than the buttons press in, and breaking.crushing_energy is too small"
+        )
+
+
+def jam_note(needed: float, stall: float) -> Iterator[str]:
+    """Say that the rotation has jammed, where it needs more torque [N m] than the motor has."""
+    if needed > stall:
+        yield (
+            f"the rotation has jammed: it needs {needed:.3g} N m, and its motor stalls at "
+            f"{stall:.3g} N m (rotation.stall_torque); less feed lets it turn again"
+        )
+
+
+def recoil_note(recoil: float, held: float) -> Iterator[str]:
+    """Say that the casing lifts off, where the recoil takes all that holds it [N]."""
+    if recoil * HELD > held:
+        yield (
+            f"the feed does not hold the casing: the recoil takes all of the {1e-3 * held:.3g} kN "
+            "that press on it, so the hammer lifts and has less than its full force; more "
+            "feed.force holds it"
+        )
+
+
+def specific_energy_note(energy: float, rock: str, strength: float) -> Iterator[str]:
+    """Say that the blow energy by volume [J/m^3] does not go with the strength of the rock [Pa]."""
+    share = energy / strength
+    if LEAST_ENERGY <= share <= MOST_ENERGY:
+        return
+    yield (
+        f"a specific energy of {1e-6 * energy:.3g} MJ/m^3 is {share:.2g} times the compressive "
+        f"strength of {rock}; drills need {LEAST_ENERGY:g} to {MOST_ENERGY:g} times: "
+        + (
+            "the hole advances by what buttons press in, not by what breaks (effects.breaking, "
+            "--bit)"
+            if share < LEAST_ENERGY
+            else "the blows hardly break it"
+        )
+    )

@@ -8,7 +8,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from percussion_model.physics.records import EventKind, Mode
+from percussion_model.scene.rocks import read_rock
+from percussion_model.scene.rocks.breaking import rock_of
 from percussion_model.scene.scales import barrier_shares
+from percussion_model.simulation.means import by_volume, numbers_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
 from percussion_model.simulation.result import Result, end_of, flight_acceleration
 from percussion_model.simulation.uncertain import in_digits
@@ -17,9 +20,13 @@ from percussion_model.simulation.validity import (
     button_note,
     flight_note,
     guard_notes,
+    jam_note,
     ledger_note,
+    limit_note,
     numerical_note,
     rate_note,
+    recoil_note,
+    specific_energy_note,
     stiffness_at,
 )
 
@@ -170,11 +177,32 @@ def _about_validity(result: Result) -> Iterator[str]:
         yield from button_note(peak, stiffness_at(scene, peak, scene.rock.loading_stiffness))
     yield from flight_note(longest_flight(result))
     yield from rate_note(result.rate_of_penetration)
+    yield from _about_breaking(result)
     if scene.loss_on and scene.loss.time > scene.bit.transit_time:
         yield (
             f"loss.time = {scene.loss.time:.3g} s is longer than a wave takes through the bit: "
             "that is no structural loss, and waves do not travel"
         )
+
+
+def _about_breaking(result: Result) -> Iterator[str]:
+    """What limits the trust in volume, rotation and feed on the casing."""
+    scene, end, blows = result.scene, result.end, result.counted
+    if not (len(blows) and end):
+        return
+    if scene["effects.breaking"]:
+        yield from limit_note(end["breaking_limited"], end["breaking_volume"])
+    if scene["effects.rotation"] and scene["rotation.stall_torque"] > 0.0:
+        yield from jam_note(end["rotation_needed_torque"], scene["rotation.stall_torque"])
+    if scene.effects.feed and scene.feed.on == "casing":
+        gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
+        held = scene.feed.force + scene.feed.casing_mass * gravity
+        yield from recoil_note(float(blows["drive_impulse"].sum() / blows["period"].sum()), held)
+    energy = by_volume(numbers_over(blows), scene.hole_diameter).get("specific_energy")
+    if energy is not None and (named := rock_of(scene)):
+        strength = read_rock(named).strength
+        if strength is not None:
+            yield from specific_energy_note(energy, named, strength.value)
 
 
 def longest_flight(result: Result) -> float:

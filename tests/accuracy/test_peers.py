@@ -187,6 +187,8 @@ STRING = {
 WITH = {
     "effects.cuttings": {"rock.removed_share": 0.3},
     "effects.drive": {"drive.external_force": 2000.0},
+    "effects.breaking": {"hole_diameter": 0.08, "breaking.buttons": 10},
+    "effects.rotation": {"rotation.mean_radius": 0.03},
     **dict.fromkeys(("effects.string", "effects.joints", "effects.damper"), STRING),
 }
 SWITCHES = [

@@ -104,7 +104,7 @@ COMPONENT = Component(
 )
 '''
 
-ROTATION = '''
+SWIVEL = '''
 """A mass that turns with the bit and rubs on the wall, whose screw thrusts the bit downward.
 
 J w' = T - k w, F = T / r.
@@ -119,25 +119,25 @@ from percussion_model.physics.kernel import inlined
 @inlined
 def thrust(par, s, h):
     """Force on the bit by its torque of friction [N]."""
-    rate = par.rotation_friction / par.rotation_inertia
+    rate = par.swivel_friction / par.swivel_inertia
     fade = -math.expm1(-rate * h)
-    steady = par.rotation_torque / par.rotation_friction
-    mean = steady + (s.rotation_speed - steady) * fade / (rate * h)
-    return par.rotation_friction * mean / par.rotation_lead
+    steady = par.swivel_torque / par.swivel_friction
+    mean = steady + (s.swivel_speed - steady) * fade / (rate * h)
+    return par.swivel_friction * mean / par.swivel_lead
 
 
 @inlined
 def turn(par, s, h):
     """Go on turning for h."""
-    rate = par.rotation_friction / par.rotation_inertia
-    steady = par.rotation_torque / par.rotation_friction
-    fade, off = -math.expm1(-rate * h), s.rotation_speed - steady
-    s.rotation_angle += steady * h + off * fade / rate
-    s.rotation_speed -= off * fade
+    rate = par.swivel_friction / par.swivel_inertia
+    steady = par.swivel_torque / par.swivel_friction
+    fade, off = -math.expm1(-rate * h), s.swivel_speed - steady
+    s.swivel_angle += steady * h + off * fade / rate
+    s.swivel_speed -= off * fade
 
 
 COMPONENT = Component(
-    "rotation",
+    "swivel",
     "a mass that turns and rubs, and thrusts the bit",
     {
         "inertia": (2e-3, "kg m^2", "moment of inertia", 1e-9, 1e3),
@@ -188,7 +188,7 @@ def run(tmp_path_factory):
     copy = folder / "percussion_model"
     leave_out = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "percussion_model", copy, ignore=leave_out)
-    for name, text in (("drag", DRAG), ("chambers", CHAMBERS), ("rotation", ROTATION)):
+    for name, text in (("drag", DRAG), ("chambers", CHAMBERS), ("swivel", SWIVEL)):
         (copy / "components" / f"{name}.py").write_text(text)
 
     def run(solver, **changes):
@@ -247,13 +247,13 @@ def test_a_drive_with_two_states(run, solver):
 
 @pytest.mark.parametrize("solver", COARSE)
 def test_a_mass_that_turns_and_rubs(run, solver):
-    found = run(solver, **{"effects.rotation": True})
+    found = run(solver, **{"effects.swivel": True})
     alone, mass = found["alone"], percussion_model.Scene().bit.mass
     rate, steady = 500.0, 50.0
     fade = -math.expm1(-rate * END)
     angle = steady * (END - fade / rate)
-    assert alone["rotation_speed"] == pytest.approx(steady * fade, rel=1e-10)
-    assert alone["rotation_angle"] == pytest.approx(angle, rel=1e-10)
+    assert alone["swivel_speed"] == pytest.approx(steady * fade, rel=1e-10)
+    assert alone["swivel_angle"] == pytest.approx(angle, rel=1e-10)
     velocity = (2500.0 * END + 10.0 * angle) / mass
     assert alone["bit_velocity"] == pytest.approx(velocity, rel=1e-8)
-    assert found["drill"]["rotation_speed"] == pytest.approx(-50.0 * math.expm1(-1.0), rel=1e-10)
+    assert found["drill"]["swivel_speed"] == pytest.approx(-50.0 * math.expm1(-1.0), rel=1e-10)

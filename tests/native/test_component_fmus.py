@@ -15,7 +15,7 @@ import pytest
 from fmpy import extract, instantiate_fmu, read_model_description, simulate_fmu
 
 from fmu_src.archive import ROOT
-from tests.invariants.test_added_component import CHAMBERS, ROTATION
+from tests.invariants.test_added_component import CHAMBERS, SWIVEL
 
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 END, STEP = 4e-3, 2.5e-4  # [s]
@@ -27,7 +27,7 @@ drive = "none"
 rock = "none"
 barrier = false
 chambers = true
-rotation = true
+swivel = true
 
 [start]
 gap = 0.5
@@ -42,7 +42,7 @@ def fmus(tmp_path_factory):
     for name in ("percussion_model", "fmu_src", "scenarios"):
         leave_out = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, folder / name, ignore=leave_out)
-    for name, text in (("chambers", CHAMBERS), ("rotation", ROTATION)):
+    for name, text in (("chambers", CHAMBERS), ("swivel", SWIVEL)):
         (folder / "percussion_model" / "components" / f"{name}.py").write_text(text)
     (folder / "with.toml").write_text(SCENE)
     shutil.copy(ROOT / "LICENSE", folder)
@@ -64,8 +64,8 @@ def test_components_move_an_fmu_as_their_closed_forms_do(fmus):
     wanted = {
         "chambers.first": supply * (1.0 - fade_1),
         "chambers.second": supply * (1.0 - (t1 * fade_1 - t2 * fade_2) / (t1 - t2)),
-        "rotation.speed": 50.0 * turned,
-        "rotation.angle": 50.0 * (END - turned / 500.0),
+        "swivel.speed": 50.0 * turned,
+        "swivel.angle": 50.0 * (END - turned / 500.0),
     }
     impulse = END - (t1**2 * (1.0 - fade_1) - t2**2 * (1.0 - fade_2)) / (t1 - t2)
     for name, path in fmus.items():

@@ -11,6 +11,7 @@ from percussion_model.interface.commands import common
 from percussion_model.scene.hammers import hammers
 
 if TYPE_CHECKING:
+    from percussion_model.analysis.rock_interval import RateInterval
     from percussion_model.interface.progress import Report
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
@@ -40,6 +41,10 @@ def run(
         bool, typer.Option(help="With --out, draw figures and write report.html.")
     ] = True,
     force: common.Force = False,
+    rock_interval: Annotated[
+        bool,
+        typer.Option(help="Tell how far the rate may lie by the intervals of rock and bit."),
+    ] = True,
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
     from percussion_model.interface import terminal
@@ -74,15 +79,30 @@ def run(
             with progress("drawing") as report:
                 files += _draw(result, claimed.folder, report)
             common.sign(claimed)
+    by_rock = None if result.cut_short else _by_rock(chosen, rock_interval)
     if json_file != "-":
         terminal.show_summary(result)
+        terminal.show_interval(result, by_rock)
     if result.interrupted:
         told = (text for text in result.warnings if text.startswith("interrupted"))
         common.print_message(next(told, "interrupted before its error was known"))
     common.list_files(files)
-    common.write_json(json_file, result.summary())
+    further = {} if by_rock is None else {"rate_by_rock": by_rock._asdict()}
+    common.write_json(json_file, result.summary() | further)
     if result.interrupted:
         raise typer.Exit(common.INTERRUPTED)
+
+
+def _by_rock(scene: Scene, is_wanted: bool) -> RateInterval | None:
+    """What the intervals of rock and bit leave of the rate, where they are known."""
+    from percussion_model.analysis.rock_interval import rate_interval, uncertain_numbers
+    from percussion_model.interface.progress import progress
+
+    if not (is_wanted and scene["effects.breaking"] and uncertain_numbers(scene)[1]):
+        return None
+    text = "sampling the intervals of rock and bit"
+    with progress(text) as report:
+        return rate_interval(scene, progress=lambda share: report(text, share))
 
 
 def settled(

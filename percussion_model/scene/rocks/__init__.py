@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from percussion_model.scene.rows import SceneError, said_among, shortened
-from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
 
 _HERE = Path(__file__).parent
 # More buttons than any bit has.
 MOST_BUTTONS = 1000
-# A number is that of a rock if it differs by rounding alone.
-SAME = 1e-9
 LAW, STIFFNESS, BUTTONS = "effects.rock", "rock.loading_stiffness", "rock.buttons"
 CHIPPING, REFERENCE = "rock.chipping_penetration", "rock.reference_penetration"
 KINDS = ("measured", "computed", "derived", "assumed")
@@ -156,7 +152,7 @@ def rock(name: str, buttons: int | None = None) -> Rock:
         raise SceneError(
             f"rock {shortened(name)}: there is none of that name: {said_among(name, rocks())}"
         )
-    found = _read(name, read_toml(_HERE / f"{name}.toml"))
+    found = _read(name)
     return found if buttons is None else found.of_buttons(buttons)
 
 
@@ -180,31 +176,10 @@ def read_rock(text: str) -> Rock:
     return found.of_buttons(int(count))
 
 
-def rock_of(scene: Scene) -> str:
-    """Name of the rock whose law and numbers a scene has, as `read_rock` takes it; or empty."""
-    found = []
-    for one in map(rock, rocks()):
-        if scene[LAW] != one.law:
-            continue
-        count = one.buttons
-        if one.buttons is not None:
-            share = scene[STIFFNESS] / one.number(STIFFNESS).value
-            count = round(one.buttons * share) if one.law == "bilinear" else scene[BUTTONS]
-            if not 1 <= count <= MOST_BUTTONS:
-                continue
-        whole = one if count == one.buttons or count is None else one.of_buttons(count)
-        if all(_same(scene[key], value) for key, value in whole.parameters.items() if key != LAW):
-            # the rock as it is before others with so many buttons
-            found.append((whole.asked or 0, one.name if whole is one else f"{one.name}:{count}"))
-    return min(found)[1] if found else ""
-
-
-def _same(value: float, other: float) -> bool:
-    return math.isclose(value, other, rel_tol=SAME)
-
-
-def _read(name: str, tree: Mapping[str, Any]) -> Rock:
+@cache
+def _read(name: str) -> Rock:
     """Rock of a file; these files are our own, and a test reads them all."""
+    tree = read_toml(_HERE / f"{name}.toml")
     numbers, breaking = (
         tuple(Number(key, **one) for key, one in tree.get(part, {}).items())
         for part in ("parameters", "craters")

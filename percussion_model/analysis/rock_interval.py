@@ -1,0 +1,107 @@
+"""How far a rate of penetration may lie by the intervals of rock and bit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from percussion_model.scene.bits import RADIUS, bit, bit_of
+from percussion_model.scene.rocks import Number, read_rock
+from percussion_model.scene.rocks.breaking import EFFICIENCY, numbers_under, rock_of
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.simulate import simulate
+
+SAMPLES = 48
+# Shares of the samples below and above which the interval ends.
+ENDS = 0.05, 0.95
+# Runs of rigid bodies that tell how a rate changes [s].
+DURATION, SETTLE = 2.0, 0.5
+
+
+class RateInterval(NamedTuple):
+    """What the intervals of rock and bit leave of a rate.
+
+    Attributes
+    ----------
+    rock : str
+        Its name.
+    low, high : float
+        Rates between which nine tenths of the samples lie, by the rate itself.
+    samples : int
+        That have a rate.
+    """
+
+    rock: str
+    low: float
+    high: float
+    samples: int
+
+
+def uncertain_numbers(scene: Scene) -> tuple[str, list[Number]]:
+    """Name of the rock that a scene has, and what is known of it and the bit by intervals."""
+    name = rock_of(scene)
+    if not name:
+        return "", []
+    numbers = [*numbers_under(read_rock(name), scene), EFFICIENCY]
+    if (own := bit_of(scene)) and scene["effects.rotation"]:
+        numbers.append(replace(bit(own).mean_radius, key=RADIUS))
+    return name, [one for one in numbers if one.low < one.high and scene.matters(one.key)]
+
+
+def rate_interval(
+    scene: Scene,
+    samples: int = SAMPLES,
+    progress: Callable[[float], None] | None = None,
+) -> RateInterval | None:
+    """Sample the intervals of a scene's rock and bit; None where its rock has no name.
+
+    How the rate changes is told by rigid bodies, where the scene has no drill string.
+
+    Parameters
+    ----------
+    scene : Scene
+        With effects.breaking; without it the rate does not follow from what breaks.
+    samples : int
+    progress : callable, optional
+        Called with the share that is done.
+    """
+    name, numbers = uncertain_numbers(scene)
+    if not numbers or not scene["effects.breaking"]:
+        return None
+    plain = scene if scene.effects.string else scene.computed_by("rigid")
+    own = _rate(plain)
+    rates = []
+    for k, shares in enumerate(_shares(samples, len(numbers))):
+        pairs = zip(numbers, shares, strict=True)
+        rates.append(_rate(plain.replace(**{one.key: _within(one, share) for one, share in pairs})))
+        if progress is not None:
+            progress((k + 1) / samples)
+    known = np.array([one for one in rates if math.isfinite(one)])
+    if len(known) == 0 or not own > 0.0:
+        return None
+    low, high = np.quantile(known / own, ENDS).tolist()
+    return RateInterval(name, low, high, len(known))
+
+
+def _shares(samples: int, numbers: int) -> list[list[float]]:
+    """Samples in a box of side 1 that are spread evenly along each side, always the same."""
+    random = np.random.default_rng(0)
+    places = random.permuted(np.tile(np.arange(samples), (numbers, 1)), axis=1).T
+    found: list[list[float]] = ((places + random.random(places.shape)) / samples).tolist()
+    return found
+
+
+def _within(one: Number, share: float) -> float:
+    """Value of a number: half of all below its own, evenly by the logarithm on both sides."""
+    if share < 0.5:
+        return float(one.low * (one.value / one.low) ** (2.0 * share))
+    return float(one.value * (one.high / one.value) ** (2.0 * share - 1.0))
+
+
+def _rate(scene: Scene) -> float:
+    found = simulate(scene, DURATION, SETTLE, error_estimate=False, record_events=False)
+    return found.rate_of_penetration
