@@ -17,9 +17,13 @@ _HERE = Path(__file__).parent
 # Revolutions in a minute are this divided by the diameter in inches (a maker's rule for
 # down-the-hole hammers, docs/breaking.md).
 RULE, INCH = 300.0, 0.0254
-HOLE, COUNT, RADIUS, SPEED = (
+HOLE, COUNT, RADIUS, SPEED, THRESHOLD = (
     "hole_diameter", "breaking.buttons", "rotation.mean_radius", "rotation.speed",
+    "breaking.threshold",
 )  # fmt: skip
+# Threshold of a crater [J] under a button of a diameter [m]; similar craters under others have
+# one by its cube.
+MEASURED_THRESHOLD, MEASURED_DIAMETER = 5.0, 17.02e-3
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,17 @@ class ButtonBit:
         return RULE / (self.diameter / INCH) * 2.0 * math.pi / 60.0
 
     @property
+    def button_diameter(self) -> float:
+        """Mean over the buttons [m]."""
+        share = self.gauge_buttons / self.buttons.value
+        return share * self.gauge_button_diameter + (1.0 - share) * self.front_button_diameter
+
+    @property
+    def threshold_share(self) -> float:
+        """Threshold of a crater under its buttons, by that under the button of the craters."""
+        return (self.button_diameter / MEASURED_DIAMETER) ** 3
+
+    @property
     def parameters(self) -> dict[str, Any]:
         """What a scene has of the bit, by dotted keys; breaking and rotation are on."""
         return {
@@ -65,6 +80,7 @@ class ButtonBit:
             HOLE: self.diameter,
             COUNT: round(self.buttons.value),
             RADIUS: self.mean_radius.value,
+            THRESHOLD: MEASURED_THRESHOLD * self.threshold_share,
             SPEED: self.usual_speed,
         }
 

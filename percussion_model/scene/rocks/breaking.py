@@ -11,6 +11,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from percussion_model.scene.bits import MEASURED_THRESHOLD, THRESHOLD, bit, bit_of
 from percussion_model.scene.rocks import (
     BUTTONS,
     LAW,
@@ -23,7 +24,7 @@ from percussion_model.scene.rocks import (
 )
 from percussion_model.scene.scene import Scene
 
-ENERGY, THRESHOLD = "breaking.crushing_energy", "breaking.threshold"
+ENERGY = "breaking.crushing_energy"
 RENEWAL, FRICTION, COUNT = "rotation.renewal_length", "rotation.friction", "breaking.buttons"
 
 # A number is that of a rock if it differs by rounding alone.
@@ -54,7 +55,8 @@ EFFICIENCY = Number(
 )
 _ASSUMED = (
     Number(
-        THRESHOLD, 5.0, 2.0, 10.0, "derived",
+        THRESHOLD,
+        MEASURED_THRESHOLD, 2.0, 10.0, "derived",
         "from craters of 7 J and 50 J on Kuru granite", second_hand=True,
     ),
     Number(
@@ -120,7 +122,19 @@ def numbers_under(rock: Rock, scene: Scene) -> tuple[Number, ...]:
         return rock.numbers
     found = on_bottom(rock, rock.asked or scene["breaking.buttons"]).numbers
     kept = ("breaking.", "rotation.") if scene["effects.rotation"] else ("breaking.",)
-    return (*found, *(one for one in breaking_numbers(rock) if one.key.startswith(kept)))
+    own = (_under_buttons(one, scene) for one in breaking_numbers(rock))
+    return (*found, *(one for one in own if one.key.startswith(kept)))
+
+
+def _under_buttons(number: Number, scene: Scene) -> Number:
+    """A threshold under the buttons of a scene's bit, where that has a name."""
+    name = bit_of(scene)
+    if number.key != THRESHOLD or not name:
+        return number
+    share = bit(name).threshold_share
+    return replace(
+        number, value=share * number.value, low=share * number.low, high=share * number.high
+    )
 
 
 def parameters_under(rock: Rock, scene: Scene) -> dict[str, Any]:
