@@ -61,7 +61,10 @@ class RigFeed(Model):
 
     def signals(self) -> dict[str, Any]:
         """What the string takes."""
-        return {"force": self.area * self.pressure - self.friction * self.speed}
+        return {
+            "force": self.area * self.pressure - self.friction * self.speed,
+            "rotation_speed": self.parameters["rotation.speed"],
+        }
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
@@ -86,6 +89,7 @@ TABLE = PartTable(
     },
     outputs={
         "force": ("N", "force on the head"),
+        "rotation_speed": ("rad/s", "speed of the rotation's motor without load"),
         "pressure": ("Pa", "pressure difference over the piston"),
         "energy": ("J", "hydraulic energy used"),
         "relief_volume": ("m3", "volume through the relief valves"),
@@ -99,8 +103,9 @@ TABLE = PartTable(
         "servo.time": ("s", 1e-3, 10.0, 0.02, "time constant of the pressure"),
         "servo.velocity": ("m/s", 1e-3, 10.0, 0.3, "velocity of the head at full flow"),
         "force_limit": ("N", 0.0, 1e7, 2e4, "force at which the relief valves open"),
+        "rotation.speed": ("rad/s", 0.0, 1e4, 4.0, "speed of the rotation's motor without load"),
         "slide.friction": ("N s/m", 0.0, 1e7, 2e3, "viscous friction of the slide"),
         "start.force": ("N", -1e6, 1e6, 0.0, "force at the start"),
     },
-    at_start={"force": ("head_velocity",), "pressure": ()},
+    at_start={"force": ("head_velocity",), "rotation_speed": (), "pressure": ()},
 )  # fmt: skip

@@ -26,7 +26,7 @@ MOST_KNOTS = 64
 class RockProfile(Model):
     """What the bit meets at its depth."""
 
-    STATE = ("depth", "feed", "pressure")
+    STATE = ("depth", "feed", "pressure", "torque")
 
     def __init__(self, parameters: dict[str, Any]) -> None:
         super().__init__(parameters)
@@ -34,7 +34,7 @@ class RockProfile(Model):
         # without any layer all is rock of the first one
         self.layers = sorted(layer for layer in layers if layer[0] >= 0.0) or layers[:1]
         self.tops = [layer[0] for layer in self.layers]
-        self.depth = self.feed = self.pressure = 0.0
+        self.depth = self.feed = self.pressure = self.torque = 0.0
         self._knots: dict[int, float] = {}
         self._spread = parameters["variation.spread"]
         self._length = parameters["variation.length"]
@@ -51,13 +51,17 @@ class RockProfile(Model):
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""
         self.depth = self.parameters["start.depth"] + inputs["bit_position"]
-        self.feed, self.pressure = inputs["feed_force"], inputs["supply_pressure"]
+        self._hold(inputs)
 
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
         """Follow the bit; rock that was drilled does not come back."""
         here = self.parameters["start.depth"] + inputs["bit_position"]
         self.depth = max(self.depth, here)
+        self._hold(inputs)
+
+    def _hold(self, inputs: dict[str, Any]) -> None:
         self.feed, self.pressure = inputs["feed_force"], inputs["supply_pressure"]
+        self.torque = inputs["bit_torque"]
 
     def variation(self, depth: float) -> float:
         """The factor exp(s n - s^2/2) at a depth [m]."""
@@ -102,7 +106,7 @@ class RockProfile(Model):
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,
-            "rotation_torque": self._arm * torque * self.feed,
+            "rotation_torque": self._arm * torque * self.feed + self.torque,
         }
 
     def outputs(self) -> dict[str, Any]:
@@ -147,12 +151,13 @@ TABLE = PartTable(
         "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
         "feed_force": ("N", -1e9, 1e9, 2500.0, "feed force on the bit"),
         "supply_pressure": ("Pa", 0.0, 1e9, 2e6, "gauge pressure at the hammer"),
+        "bit_torque": ("N.m", 0.0, 1e12, 0.0, "torque of a hammer with effects.rotation"),
     },
     outputs={
         "loading_stiffness": ("N/m", "loading stiffness K_R at the bit"),
         "unloading_ratio": ("1", "gamma at the bit"),
         "depth": ("m", "greatest depth of the bit"),
-        "rotation_torque": ("N.m", "torque on the rotation"),
+        "rotation_torque": ("N.m", "torque on the rotation, that of the bit and by the rock"),
         "in_void": (False, "whether the layer is soft enough to count as a void"),
         "layer": (COUNT, "number of the layer"),
     },
@@ -173,7 +178,7 @@ TABLE = PartTable(
         "loading_stiffness": ("bit_position", "feed_force", "supply_pressure"),
         "unloading_ratio": ("bit_position",),
         "depth": ("bit_position",),
-        "rotation_torque": ("bit_position", "feed_force"),
+        "rotation_torque": ("bit_position", "feed_force", "bit_torque"),
         "in_void": ("bit_position",),
         "layer": ("bit_position",),
     },

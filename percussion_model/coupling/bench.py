@@ -94,7 +94,26 @@ def _layer(number: int, top: float, **values: float) -> dict[str, float]:
     }
 
 
+def _motor_stops() -> OnWay:
+    def change(signal: str, time: float, value: Any) -> Any:
+        stops = signal == "hammer.rotation.speed" and 1.5 <= time < 2.0
+        return 0.0 if stops else value
+
+    return change
+
+
 _ONE_ROCK = {**_layer(1, 0.0, loading_stiffness=7.5e8), **_layer(2, -1.0), **_layer(3, -1.0)}
+# A wide bit, whose motor has little torque to spare: once it stands, it needs more to begin.
+_TURNING = {
+    "hammer.effects.breaking": True,
+    "hammer.hole_diameter": 0.0826,
+    "hammer.breaking.buttons": 10,
+    "hammer.effects.rotation": True,
+    "hammer.rotation.mean_radius": 0.08,
+    "hammer.rotation.friction": 0.8,
+    "hammer.rotation.stall_torque": 265.0,
+    "hammer.rotation.full_torque": 255.0,
+}
 STANDARD_RUNS = (
     StandardRun(
         "collaring", "the feed begins at a third", 3.0,
@@ -123,6 +142,10 @@ STANDARD_RUNS = (
     StandardRun(
         "jam", "a centimetre of rock that holds the bit", 4.0,
         {**_ONE_ROCK, **_layer(2, 0.03, torque_factor=3.0), **_layer(3, 0.04)},
+    ),
+    StandardRun(
+        "rotation", "the motor of the rotation stops for 0.5 s", 5.0,
+        {**_ONE_ROCK, **_layer(1, 0.0, torque_factor=0.0), **_TURNING}, _motor_stops,
     ),
 )  # fmt: skip
 

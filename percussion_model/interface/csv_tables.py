@@ -28,6 +28,10 @@ UNITS = {
     "N": ("N", "kN", "MN", "lbf"),
     "Pa": ("Pa", "kPa", "MPa", "GPa", "psi"),
     "m/s": ("m/s", "mm/s", "km/h", "m/h", "m/min", "mm/min", "ft/h"),
+    "rad/s": ("rad/s", "rpm"),
+    "N m": ("N m", "kN m", "ft lbf"),
+    "J": ("J", "kJ", "ft lbf"),
+    "m^3": ("m^3", "cm^3", "mm^3", "in^3"),
 }
 SEPARATORS = (";", "\t", ",")
 COMMENTS = ("#", "%", "//", "!")

@@ -34,8 +34,11 @@ _SIGN = r"(?:[ ]?[*·/][ ]?|[ ])"
 _UNIT = re.compile(rf"{_FACTOR}(?:{_SIGN}{_FACTOR}){{0,5}}")
 _QUANTITY = re.compile(rf"[ ]*(?P<number>{_NUMBER})[ ]*(?P<unit>{_UNIT.pattern})[ ]*")
 _FACTORS = re.compile(r"(?P<sign>^|[ *·/]+)(?P<name>[A-Za-zµμ]+|%)(?P<power>[²³]|\^?-?[1-9])?")
-# Angles, temperatures and bits are in no parameter.
-_DIMENSIONS = {"[length]", "[mass]", "[time]"}
+# Temperatures and bits are in no parameter.
+_DIMENSIONS = {"[length]", "[mass]", "[time]", "[angle]"}
+# For pint these have no dimension: then a frequency were a speed of rotation.
+_ANGLES = ("rad", "radian", "deg", "degree", "revolution", "turn")
+_ROTATION = ("rpm",)
 # People mean different masses by it.
 _AMBIGUOUS = {"ton": "t or lb", "tons": "t or lb"}
 
@@ -75,6 +78,10 @@ QUANTITIES = {
     "J": Quantity("an energy", ("0.05", "50 mJ", "0.03688 ft lbf"), ("kJ", "mJ", "ft lbf")),
     "m/s": Quantity("a velocity", ("10", "1000 cm/s", "32.81 ft/s"), ("mm/s", "km/h", "ft/s")),
     "m/s^2": Quantity("an acceleration", ("9.81", "32.19 ft/s^2"), ("mm/s^2", "ft/s^2")),
+    "rad/s": Quantity("a speed of rotation", ("5.655", "54 rpm"), ("rpm", "deg/s")),
+    "N m": Quantity("a torque", ("600", "0.6 kN m", "442.5 ft lbf"), ("kN m", "ft lbf")),
+    "m^3": Quantity("a volume", ("5e-6", "5 cm^3"), ("cm^3", "l", "in^3")),
+    "J/m^3": Quantity("an energy by volume", ("5.5e7", "55 MJ/m^3"), ("MJ/m^3", "J/cm^3")),
     "-": Quantity("a pure number", ("0.01", "1 %"), ("%",)),
 }  # fmt: skip
 
@@ -199,7 +206,7 @@ def factor(unit: str, si: str) -> Fraction:
 
 
 def _factor_and_dimension(unit: str, si: str) -> tuple[Fraction, dict[str, int]]:
-    """Factor of a unit to that of its dimension, and powers of length, mass and time."""
+    """Factor of a unit to that of its dimension, and powers of length, mass, time, angle."""
     from fractions import Fraction
 
     product, powers = Fraction(1), dict.fromkeys(_DIMENSIONS, 0)
@@ -248,6 +255,8 @@ def _single(name: str, si: str, whole: str) -> tuple[Fraction, tuple[tuple[str, 
     except Exception:  # of logarithms
         raise UnitError from None
     dimension = tuple((key, int(power)) for key, power in found.dimensionality.items())
+    if name in (*_ANGLES, *_ROTATION):
+        dimension = (*dimension, ("[angle]", 1))
     if nothing.magnitude != 0 or not dimension or not {key for key, _ in dimension} <= _DIMENSIONS:
         raise UnitError
     return Fraction(found.magnitude), dimension

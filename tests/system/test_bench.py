@@ -62,6 +62,18 @@ def test_nothing_fails_where_the_bit_is_held(feed_control):
     assert retracting.numbers["violations"] < 0.6 * idle.numbers["violations"]
 
 
+def test_rotation_jams_where_nobody_looks_at_its_torque(feed_control):
+    """Once it stands, the climb out of its craters is too steep for the motor at this feed."""
+    blind = {"controller.retract.on": False}
+    for controller, values in ((nothing, {}), (None, blind)):
+        (jammed,) = bench(feed_control, controller, values, trials=["rotation"], check_step=False)
+        assert jammed.points == 0.0
+        assert jammed.run["rock.rotation_torque"][-1] == pytest.approx(265.0)  # its motor's most
+    (seeing,) = bench(feed_control, trials=["rotation"], check_step=False)
+    assert seeing.faults == []
+    assert seeing.numbers["depth"] > 2.0 * jammed.numbers["depth"]
+
+
 def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, capsys):
     source = tmp_path / "mine.py"
     source.write_text(

@@ -44,6 +44,24 @@ def calibrate(
             "penetration_per_blow or rate_of_penetration (m/h) of the hammer. May be repeated.",
         ),
     ] = None,
+    site: Annotated[
+        Path | None,
+        typer.Option(
+            "--site",
+            metavar="CSV",
+            help="Rates and torques at settings: rate_of_penetration [m/h], rotation_torque [N m], "
+            "and keys of the scene, as rotation.speed [rpm]. Fits breaking and rotation.",
+        ),
+    ] = None,
+    crater: Annotated[
+        Path | None,
+        typer.Option(
+            "--crater",
+            metavar="CSV",
+            help="Craters of one button: energy crushed [J], volume [cm^3]. Fits crushing energy "
+            "and threshold.",
+        ),
+    ] = None,
     gauge: Annotated[
         float | None,
         typer.Option("--gauge", help="Gauge, in m from the bit's top; else in its middle."),
@@ -90,8 +108,13 @@ def calibrate(
     from percussion_model.interface.progress import progress
     from percussion_model.scene.writing import is_special
 
-    if not curve and not drop and not measured:
-        raise common.refusal("nothing to fit: give --curve, --drop or --measured")
+    of_rock = bool(curve or drop or measured)
+    if sum((of_rock, site is not None, crater is not None)) != 1:
+        raise common.refusal(
+            "one fit at a time: give --curve, --drop or --measured, or --site, or --crater"
+            if of_rock or site or crater
+            else "nothing to fit: give --curve, --drop, --measured, --site or --crater"
+        )
     common.check_json(json_file)
     if figure is not None and not is_special(figure):
         figure = figure.with_suffix(".png")
@@ -100,6 +123,11 @@ def calibrate(
         if path is not None:
             common.refuse_existing(path, force)
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock, bit=bit)
+    if site is not None or crater is not None:
+        from percussion_model.interface.commands.calibrate_site import calibrate_breaking
+
+        calibrate_breaking(chosen, site, crater, out, json_file, scene)
+        return
     slow = [read_curve(path) for path in curve or ()]
     drops = [read_drop(word, gauge) for word in drop or ()]
     numbers = [read_reading(word) for word in measured or ()]

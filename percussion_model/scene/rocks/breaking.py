@@ -158,8 +158,9 @@ def rock_of(scene: Scene) -> str:
         count = _buttons_under(one, scene)
         if one.buttons is not None and not (count and 1 <= count <= MOST_BUTTONS):
             continue
-        is_own = count in (one.buttons, None) or scene["effects.breaking"]
-        whole = one if is_own else one.of_buttons(count)
+        whole = one
+        if count is not None and count != one.buttons and not scene["effects.breaking"]:
+            whole = one.of_buttons(count)
         wanted = {**parameters_under(whole, scene), **dict.fromkeys((LAW, COUNT))}
         if all(_same(scene[key], value) for key, value in wanted.items() if value is not None):
             # the rock as it is before others with so many buttons

@@ -1,0 +1,97 @@
+"""Breaking and rotation from a site's rates and torques, and from craters."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from commands import percussion
+
+from percussion_model import simulate
+from percussion_model.analysis.fitting import FitError
+from percussion_model.analysis.fitting.site import fit_craters, fit_site
+from percussion_model.scene.hammers import hammer
+from percussion_model.scene.rocks import rock
+from percussion_model.scene.rocks.breaking import parameters_under
+
+RPM = 2.0 * math.pi / 60.0
+TRUTH = {
+    "breaking.crushing_energy": 7.5e7,
+    "rotation.renewal_length": 3.5e-3,
+    "rotation.friction": 0.6,
+}
+
+
+def scene():
+    """Rigid bodies, which are quick."""
+    found = hammer("dth5")
+    return found.replace(**parameters_under(rock("kuru-granite"), found)).computed_by("rigid")
+
+
+def measured(settings):
+    """What a site with other rock gives at settings."""
+    truth = scene().replace(**TRUTH)
+    found = {"rate_of_penetration": [], "rotation_torque": []}
+    for k in range(len(next(iter(settings.values())))):
+        run = truth.replace(**{key: values[k] for key, values in settings.items()})
+        summary = simulate(run, 6.0, 1.0, error_estimate=False).summary()
+        for name, values in found.items():
+            values.append(summary[name])
+    return settings | found
+
+
+def test_rates_at_two_speeds_and_torques_find_the_rock_of_a_site():
+    settings = {"rotation.speed": [54 * RPM, 20 * RPM, 10 * RPM, 54 * RPM],
+                "drive.force": [11800.0, 11800.0, 11800.0, 8000.0]}  # fmt: skip
+    found = fit_site(scene(), measured(settings))
+    assert set(TRUTH) <= set(found.changes())
+    for one in found.estimates:
+        if one.key in TRUTH:  # within two standard errors, none of which is wide
+            assert abs(math.log(one.value / TRUTH[one.key])) < 2.0 * math.log(one.factor)
+            assert one.factor < 1.3
+
+
+def test_one_rate_tells_the_crushing_energy_and_no_renewal_length():
+    data = measured({"rotation.speed": [54 * RPM]})
+    del data["rotation_torque"]
+    found = {one.key: one for one in fit_site(scene(), data).estimates}
+    length, energy = found["rotation.renewal_length"], found["breaking.crushing_energy"]
+    assert not length.is_told
+    assert length.value == pytest.approx(scene()["rotation.renewal_length"], rel=0.05)
+    assert energy.factor < energy.prior_factor
+    assert energy.value > 6e7
+
+
+def test_craters_lie_on_a_line_above_a_threshold():
+    volume = np.array([1e-7, 3e-7, 4e-7, 8e-7])
+    energy, error, threshold, other = fit_craters(4.0 + 6e7 * volume, volume)
+    assert (energy, threshold) == pytest.approx((6e7, 4.0), rel=1e-9)
+    assert error / energy < 1e-9 > other / threshold
+    with pytest.raises(FitError, match="at least three"):
+        fit_craters([1.0, 2.0], [1e-7, 2e-7])
+    with pytest.raises(FitError, match="do not grow"):
+        fit_craters([30.0, 20.0, 10.0], [1e-7, 2e-7, 3e-7])
+
+
+def test_the_command_fits_craters_and_writes_the_scene(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "craters.csv").write_text(
+        "energy [J],volume [cm^3]\n10,0.1\n22,0.3\n28,0.4\n52,0.8\n", encoding="utf-8"
+    )
+    scene().to_toml(tmp_path / "drill.toml")
+    words = ["calibrate", "drill.toml", "--crater", "craters.csv", "--json", "-"]
+    assert percussion(*words, "--out", "fitted.toml") == 0
+    changes = json.loads(capsys.readouterr().out)["changes"]
+    assert changes["breaking.crushing_energy"] == pytest.approx(6e7, rel=1e-6)
+    assert "crushing_energy = 6" in (tmp_path / "fitted.toml").read_text(encoding="utf-8")
+
+
+def test_what_cannot_be_fitted_is_said(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "site.csv").write_text("rate_of_penetration [m/h]\n20\n", encoding="utf-8")
+    assert percussion("calibrate", "reference", "--site", "site.csv") == 2
+    assert "give --bit" in capsys.readouterr().err
+    assert percussion("calibrate", "reference") == 2
+    assert "nothing to fit" in capsys.readouterr().err
