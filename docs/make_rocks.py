@@ -7,23 +7,29 @@ from pathlib import Path
 from textwrap import fill
 
 from docs.blocks import table
+from percussion_model.interface.commands.bits import HEADINGS as BIT_HEADINGS
+from percussion_model.interface.commands.bits import NOTE as BIT_NOTE
+from percussion_model.interface.commands.bits import cells as bit_cells
 from percussion_model.interface.commands.rocks import (
     HEADINGS,
     NOTES,
+    SHOWN,
     cells,
     interval_text,
     kind_text,
 )
+from percussion_model.scene.bits import bit, bits
 from percussion_model.scene.rocks import REFERENCE, STIFFNESS, Number, Rock, rock, rocks
+from percussion_model.scene.rocks.breaking import breaking_numbers
 from percussion_model.scene.rocks.derived import button_stiffness, mean_factor, pressure_factors
 
 PAGE = Path(__file__).with_name("rocks.md")
-HEAD = f"""# Rocks
+HEAD = f"""# Rocks and bits
 
-`percussion run SCENE --rock kuru-granite:10` takes law and numbers of a rock, for a bit of ten
-buttons; `--set` wins over it. All commands that take a scene take it, and so do `new`, `fmu` and
-`native`. In Python: `Scene().replace(**rock("kuru-granite", buttons=10).parameters)`, with `rock`
-of `percussion_model.scene.rocks`. `percussion rocks` prints this table, `percussion rocks NAME`
+`percussion run SCENE --rock kuru-granite` takes law and numbers of a rock, for the bit that the
+scene has (`--bit dth-140`), or, as in `kuru-granite:10`, for ten buttons; `--set` wins over it.
+All commands that take a scene take it, and so do `new`, `fmu` and `native`. In Python:
+`Scene().replace(**rock("kuru-granite", buttons=10).parameters)`, with `rock` of `percussion_model.scene.rocks`. `percussion rocks` prints this table, `percussion rocks NAME`
 all of one.
 
 {fill(" ".join(NOTES), 110)}
@@ -60,7 +66,8 @@ def sources(chosen: Iterable[Rock]) -> list[str]:
     """Lines of the tables of bits, blows, intervals and publications."""
     lines = []
     for one in chosen:
-        known = (*one.numbers, *([one.strength] if one.strength else []))
+        strength = [one.strength] if one.strength else []
+        known = (*one.numbers, *strength, *breaking_numbers(one))
         rows = [
             ("bit", one.indenter),
             ("fitted to", one.fitted_to),
@@ -94,6 +101,12 @@ def check(factors: dict[str, float]) -> list[str]:
     return ["", table(headings, rows)]
 
 
+def bit_lines() -> list[str]:
+    """Lines of the table of bits."""
+    rows = [(f"`{name}`", *rest) for name, *rest in map(bit_cells, map(bit, bits()))]
+    return ["\n## Bits\n", table(BIT_HEADINGS, rows), "", fill(BIT_NOTE, 110)]
+
+
 def of(key: str) -> str:
     """Name of a number in these tables."""
     return "strength" if key == "strength" else f"`{key}`"
@@ -101,7 +114,8 @@ def of(key: str) -> str:
 
 def told(one: Number) -> str:
     """A number with its unit, kind and reason."""
-    unit = {STIFFNESS: " kN/mm", "strength": " MPa", REFERENCE: " mm"}.get(one.key, "")
+    unit = {STIFFNESS: "kN/mm", "strength": "MPa", REFERENCE: "mm"}.get(one.key, SHOWN[one.key][1])
+    unit = f" {unit}" if unit else ""
     return f"{interval_text(one)}{unit}, {kind_text(one)}: {one.why}"
 
 
@@ -110,7 +124,14 @@ def page() -> str:
     chosen, factors = [rock(name) for name in rocks()], pressure_factors()
     values = factors.values()
     words = DERIVED.format(mean=mean_factor(values), low=min(values), high=max(values))
-    lines = [HEAD.rstrip(), *numbers(chosen), words.rstrip(), *check(factors), *sources(chosen)]
+    lines = [
+        HEAD.rstrip(),
+        *numbers(chosen),
+        words.rstrip(),
+        *check(factors),
+        *bit_lines(),
+        *sources(chosen),
+    ]
     return "\n".join(lines) + "\n"
 
 

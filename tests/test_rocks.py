@@ -20,9 +20,9 @@ from percussion_model.scene.rocks import (
     STIFFNESS,
     read_rock,
     rock,
-    rock_of,
     rocks,
 )
+from percussion_model.scene.rocks.breaking import rock_of
 from percussion_model.scene.rocks.derived import derived_stiffness, pressure_factors
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.typical import unusual_values

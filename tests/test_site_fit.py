@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from commands import percussion
 
 from percussion_model import simulate
 from percussion_model.analysis.fitting import FitError
@@ -15,6 +14,7 @@ from percussion_model.analysis.fitting.site import fit_craters, fit_site
 from percussion_model.scene.hammers import hammer
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import parameters_under
+from tests.commands import percussion
 
 RPM = 2.0 * math.pi / 60.0
 TRUTH = {
