@@ -29,8 +29,9 @@ HEAD = f"""# Rocks and bits
 `percussion run SCENE --rock kuru-granite` takes law and numbers of a rock, for the bit that the
 scene has (`--bit dth-140`), or, as in `kuru-granite:10`, for ten buttons; `--set` wins over it.
 All commands that take a scene take it, and so do `new`, `fmu` and `native`. In Python:
-`Scene().replace(**rock("kuru-granite", buttons=10).parameters)`, with `rock` of `percussion_model.scene.rocks`. `percussion rocks` prints this table, `percussion rocks NAME`
-all of one.
+`Scene().replace(**rock("kuru-granite", buttons=10).parameters)`, with `rock` of
+`percussion_model.scene.rocks`. `percussion rocks` prints this table, `percussion rocks NAME` all
+of one.
 
 {fill(" ".join(NOTES), 110)}
 
