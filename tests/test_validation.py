@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from docs import make_validation
+from percussion_model.verification import rates
 from percussion_model.verification.measured import FitPlan, Measurement, compare, load, wanted
 from percussion_model.verification.measured.blow import Reading, Rig, rebound, strike
 from percussion_model.verification.measured.comparison import (
@@ -34,6 +35,7 @@ from percussion_model.verification.measured.table import (
     count_text,
     parameters_text,
 )
+from percussion_model.verification.rates import compare_rates
 from tests.commands import percussion
 
 # The search for chipping takes most of a minute, and each of two workers has the fits.
@@ -97,12 +99,37 @@ def test_a_number_that_some_fits_miss_is_not_met(kuru):
     assert counts == {MET: 0, MISSED: 0, MIXED: 1, UNDECIDED: 0, NO_CRITERION: 0}
 
 
-def made_row(fit, verdict):
+def test_a_number_counts_once_over_laws_and_by_what_decides_it(kuru):
+    rows = [
+        made_row("a", MET, "rock"), made_row("b", MET, "masses"),
+        replace(made_row("a", MET, "masses"), id="other"),
+        replace(made_row("b", MISSED, "masses"), id="other", law="bilinear"),
+    ]  # fmt: skip
+    fits = [
+        FoundFit(kuru.name, law, name, "", (), {}, {}, {}, (), kuru.scene)
+        for name, law in (("a", "power"), ("b", "bilinear"))
+    ]
+    found = Comparison([kuru], rows, fits, []).counts_once()
+    assert {name: one for name, one in found["rock"].items() if one} == {MET: 1}
+    assert {name: one for name, one in found["masses"].items() if one} == {MIXED: 1}
+
+
+def test_no_rock_changes_the_first_wave(found):
+    by = {row.id: row.decided_by for row in found.rows if row.role == PREDICTED}
+    assert {one for name, one in by.items() if name.startswith("first wave")} == {"masses"}
+    assert by["peak force"] == by["penetration at 13 m/s"] == "rock"
+    # no criterion, so nothing that could be decided
+    assert by["end of loading at 9 m/s"] == ""
+    once = found.counts_once()
+    assert sum(once["masses"].values()) + sum(once["rock"].values()) == 13
+
+
+def made_row(fit, verdict, decided_by=""):
     """A predicted penetration."""
     numbers = (1e-3, 1e-4, "measured", 1e-3, 0.0, 0.0, 0.0, 0.15)
     return Row(
         "single_insert_kuru", "", "power", fit, PREDICTED, "penetration", "penetration", 9.0,
-        *numbers, verdict, "",
+        *numbers, verdict, "", decided_by,
     )  # fmt: skip
 
 
@@ -133,7 +160,7 @@ def test_the_page_has_these_numbers(found):
     if IS_LONG:
         assert count_text(found) in page
     by_hand = before + rest.partition("<!-- end -->")[2]
-    assert len(by_hand.split()) <= 900
+    assert len(by_hand.split()) <= 1000
 
 
 def test_a_fit_finds_the_rock_that_made_the_numbers(kuru):
@@ -317,6 +344,24 @@ def test_the_command_writes_table_and_figure(tmp_path, capsys):
     assert {"validation.csv", "validation.json", "triple_button_kuru.png"} <= names
     tree = json.loads((out / "validation.json").read_text(encoding="utf-8"))
     assert len(tree["rows"]) == 10
+    assert "rates" not in tree
+
+
+def test_the_command_has_rates_by_their_name(tmp_path, capsys, monkeypatch):
+    few = rates.stored_cases()
+    few = replace(few, cases=(few.cases[0], few.cases[-1]))
+    monkeypatch.setattr(rates, "compare_rates", lambda progress: compare_rates(few, progress))
+    out = tmp_path / "out"
+    assert percussion("validate", "rates", "--out", out) == 0
+    shown = capsys.readouterr().out
+    assert "predicted" in shown
+    assert "not claimed" in shown
+    names = {path.name for path in out.iterdir()}
+    assert {"rates.csv", "rates.png", "validation.json"} <= names
+    tree = json.loads((out / "validation.json").read_text(encoding="utf-8"))
+    assert tree["rows"] == []
+    assert [row["id"] for row in tree["rates"]["rows"]] == ["top_01", "dth_7"]
+    assert tree["rates"]["verdicts"]["all cases"]
 
 
 def test_bad_input_is_one_line(tmp_path, capsys):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +13,10 @@ from percussion_model.interface.commands import common
 if TYPE_CHECKING:
     from percussion_model.simulation.origin import Claim
     from percussion_model.verification.measured import Comparison
+    from percussion_model.verification.rates import Rates
+
+# By this name the published rates are asked for, as an experiment is by its own.
+RATES = "rates"
 
 
 def validate(
@@ -20,7 +24,8 @@ def validate(
         list[str] | None,
         typer.Argument(
             metavar="[EXPERIMENT]...",
-            help="Stored experiments, or TOML files of own ones; all stored ones if left out.",
+            help="Stored experiments, TOML files of own ones, or rates for drilling rates; all "
+            "that is stored if left out.",
         ),
     ] = None,
     out: common.Out = None,
@@ -29,7 +34,7 @@ def validate(
     variants: Annotated[bool, typer.Option(help="Compute other rigs and readings as well.")] = True,
     figures: Annotated[bool, typer.Option(help="Draw a figure for each experiment.")] = True,
 ) -> None:
-    """Compare with published experiments: what is fitted, what is predicted, and what is missed.
+    """Compare with published experiments and rates: what is fitted, predicted, and missed.
 
     Exit code 0 whatever is missed: that is a finding.
     """
@@ -37,47 +42,68 @@ def validate(
     from percussion_model.verification.measured import compare, load
 
     common.check_outputs(out, json_file)
-    chosen = load(experiments or ())
+    named = [one for one in experiments or () if one != RATES]
+    chosen = load(named) if named or not experiments else []
+    with_rates = len(named) < len(experiments or (RATES,))
     claimed = None
     if out is not None:
         claimed = common.claim(
             "validate", out, None, force, variants=variants,
             scenes={one.name: one.scene for one in chosen},
-            files={name: common.digest(Path(name)) for name in experiments or ()},
+            files={name: common.digest(Path(name)) for name in named}, rates=with_rates,
         )  # fmt: skip
     common.tell_of_compiling("wave")
     with count_bar("fits") as progress:
         found = compare(chosen, variants, progress)
-    common.write_json(json_file, found.to_dict())
+    rates = _rates() if with_rates else None
+    tree = found.to_dict() | ({} if rates is None else {RATES: rates.to_dict()})
+    common.write_json(json_file, tree)
     if json_file != "-":
-        show_validation(found)
+        if chosen:
+            show_validation(found)
+        if rates is not None:
+            show_rates(rates)
     if claimed is not None:
-        _write(found, claimed, figures)
+        _write(found, rates, tree, claimed, figures)
         common.list_files(common.sign(claimed))
 
 
-def _write(found: Comparison, claimed: Claim, figures: bool) -> None:
-    """Write the table as CSV and JSON, and the figures, into a claimed folder."""
+def _rates() -> Rates:
+    from percussion_model.interface.progress import count_bar
+    from percussion_model.verification.rates import compare_rates
+
+    with count_bar("rates") as progress:
+        return compare_rates(progress=progress)
+
+
+def _write(
+    found: Comparison, rates: Rates | None, tree: dict[str, Any], claimed: Claim, figures: bool
+) -> None:
+    """Write the tables as CSV and JSON, and the figures, into a claimed folder."""
     from percussion_model.interface.progress import progress
     from percussion_model.simulation.files import to_json
     from percussion_model.verification.measured.table import as_csv
+    from percussion_model.verification.rates.table import as_csv as rates_as_csv
 
-    texts = {
-        "validation.csv": as_csv(found),
-        "validation.json": to_json(found.to_dict()) + "\n",
-    }
+    texts = {"validation.csv": as_csv(found), "validation.json": to_json(tree) + "\n"}
+    if rates is not None:
+        texts["rates.csv"] = rates_as_csv(rates)
     common.write_texts(claimed, texts)
     if not figures:
         return
     with common.if_drawable():
+        from percussion_model.interface.plotting.rates import draw_rates
         from percussion_model.interface.plotting.style import save_figures
         from percussion_model.interface.plotting.validation import draw_all
 
-        names = [one.name for one in found.experiments]
+        def figures_of() -> Iterator[tuple[str, Any]]:
+            yield from draw_all(found)
+            if rates is not None:
+                yield RATES, draw_rates(rates)
+
+        names = [one.name for one in found.experiments] + ([] if rates is None else [RATES])
         with progress("drawing") as report:
-            drawn = save_figures(
-                lambda: draw_all(found), claimed.folder, names=names, report=report
-            )
+            drawn = save_figures(figures_of, claimed.folder, names=names, report=report)
         common.list_files(drawn)
 
 
@@ -115,3 +141,31 @@ def show_validation(found: Comparison) -> None:
     for why, ids in texts.reasons(found).items():
         show_note(f"no criterion for {', '.join(ids)}", why)
     print_notes([*texts.NOTES, texts.count_text(found)])
+
+
+def show_rates(found: Rates) -> None:
+    """Print the rates, case after case, and what each criterion says."""
+    from rich.console import Console
+
+    from percussion_model.interface.tables import airy_table, print_notes, print_table
+    from percussion_model.verification.rates import table as texts
+
+    console = Console()
+
+    def print_rows(
+        title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[str]
+    ) -> None:
+        console.print(f"[bold]{title}[/bold]", highlight=False)
+        left = [one for one in headings if one in texts.OF_WORDS]
+        table = airy_table(headings, left, words, pad_edge=False, padding=0)
+        for row in rows:
+            table.add_row(*row)
+        print_table(table)
+        console.print()
+
+    print_rows(texts.TITLE, texts.HEADINGS, map(texts.cells, found.rows), ("rock", "hammer"))
+    print_rows(
+        "Criteria of the rates", texts.OF_VERDICTS, texts.verdict_rows(found),
+        ("of", "criterion", "asked"),
+    )  # fmt: skip
+    print_notes([*texts.NOTES, texts.summary(found)])

@@ -60,6 +60,9 @@ QUOTIENT, SPEEDS = "restitution", ("rebound_velocity", "indentation_velocity")
 FITTED, PREDICTED = "fitted", "predicted"
 MET, MISSED, UNDECIDED, NO_CRITERION = "met", "missed", "undecided", "no criterion"
 MIXED = "met by some fits"
+ROCK, MASSES = "rock", "masses"
+# Shares of the stiffness, and of what gamma is above 1, by which the rock's say is tried.
+OTHER_ROCKS = (0.5, 2.0)
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,9 @@ class Row:
         `met`, `missed`, `undecided`, `no criterion`; `fitted` for what was fitted and reached.
     reason : str
         Why there is no criterion.
+    decided_by : str
+        `rock` or `masses`, of a prediction with a criterion: the rock decides what half or twice
+        its stiffness, or of gamma - 1, moves by more than the criterion.
     """
 
     experiment: str
@@ -112,6 +118,7 @@ class Row:
     within: float | None
     verdict: str
     reason: str
+    decided_by: str = ""
 
 
 @dataclass(frozen=True)
@@ -196,6 +203,26 @@ class Comparison:
         `anew`: those that move some parameters of another one. A restitution, the quotient of
         two speeds, does not count beside them.
         """
+        found = self._predicted(law, anew)
+        return _counted({key: {row.verdict for row in rows} for key, rows in found.items()})
+
+    def counts_once(self) -> dict[str, dict[str, int]]:
+        """The same over all laws, by what decides: rock or masses; without those of no criterion.
+
+        A number that the rock decides by one fit is the rock's.
+        """
+        found = self._predicted()
+        split: dict[str, dict[tuple[str, str], set[str]]] = {ROCK: {}, MASSES: {}}
+        for key, rows in found.items():
+            by = {row.decided_by for row in rows}
+            if by != {""}:
+                split[ROCK if ROCK in by else MASSES][key] = {row.verdict for row in rows}
+        return {name: _counted(rows) for name, rows in split.items()}
+
+    def _predicted(
+        self, law: str | None = None, anew: bool = False
+    ) -> dict[tuple[str, str], list[Row]]:
+        """Predictions of each measured number, as `counts` takes them."""
         chosen = {
             (f.experiment, f.name)
             for f in self.fits
@@ -203,15 +230,12 @@ class Comparison:
         }
         rows = [row for row in self.rows if (row.experiment, row.fit) in chosen]
         known = {_place(row, row.quantity) for row in rows}
-        found: dict[tuple[str, str], set[str]] = {}
+        found: dict[tuple[str, str], list[Row]] = {}
         for row in rows:
             speeds = {_place(row, one) for one in SPEEDS}
             if row.role == PREDICTED and not (row.quantity == QUOTIENT and speeds <= known):
-                found.setdefault((row.experiment, row.id), set()).add(row.verdict)
-        verdicts = [one.pop() if len(one) == 1 else MIXED for one in found.values()]
-        return {
-            name: verdicts.count(name) for name in (MET, MISSED, MIXED, UNDECIDED, NO_CRITERION)
-        }
+                found.setdefault((row.experiment, row.id), []).append(row)
+        return found
 
     def of(self, experiment: str, fit: str | None = None) -> list[Row]:
         """Rows of an experiment, or of one fit of it."""
@@ -225,6 +249,7 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""
         return {
+            "predictions_once": self.counts_once(),
             "predictions": {law: self.counts(law) for law in self.laws},
             "predictions_anew": self.counts(anew=True),
             "rows": [asdict(row) for row in self.rows],
@@ -235,6 +260,12 @@ class Comparison:
                 for one in self.experiments
             },
         }
+
+
+def _counted(found: Mapping[Any, set[str]]) -> dict[str, int]:
+    """How many numbers have each verdict; what fits do not agree on is `MIXED`."""
+    verdicts = [next(iter(one)) if len(one) == 1 else MIXED for one in found.values()]
+    return {name: verdicts.count(name) for name in (MET, MISSED, MIXED, UNDECIDED, NO_CRITERION)}
 
 
 def _place(row: Row, quantity: str) -> tuple[Any, ...]:
@@ -389,7 +420,26 @@ def _rows(experiment: Experiment, plan: FitPlan, found: FoundFit, rig: Rig) -> I
             numerical_error=numerical,
             fit_error=found.prediction_errors.get(name, math.nan), deviation=off,
             within=one.within, verdict=verdict(one, off, numerical, role), reason=one.no_criterion,
+            decided_by=_decided_by(one, found.scene, rig, off) if role == PREDICTED else "",
         )  # fmt: skip
+
+
+def _decided_by(one: Measurement, scene: Scene, rig: Rig, off: float) -> str:
+    """Whether the rock can move a number by more than its criterion, or else the masses decide."""
+    if one.within is None or not math.isfinite(off):
+        return "" if one.within is None else ROCK
+    stiffness, ratio = BOTH_LAWS
+    low, high = LAWS["bilinear"][ratio]
+    for share in OTHER_ROCKS:
+        other = 1.0 + share * (float(scene[ratio]) - 1.0)
+        for key, value in (
+            (stiffness, share * float(scene[stiffness])),
+            (ratio, min(max(other, low), high)),
+        ):
+            moved = rig.read(scene.replace(**{key: value}), one.quantity, one.speed)
+            if not abs(deviation(one, moved) - off) <= one.within:
+                return ROCK
+    return MASSES
 
 
 def _errors(

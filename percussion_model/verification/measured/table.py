@@ -11,11 +11,13 @@ from dataclasses import asdict, fields
 from percussion_model.simulation.uncertain import in_digits, with_short_error
 from percussion_model.verification.measured.comparison import (
     FITTED,
+    MASSES,
     MET,
     MISSED,
     MIXED,
     NO_CRITERION,
     PREDICTED,
+    ROCK,
     UNDECIDED,
     Comparison,
     FoundFit,
@@ -51,6 +53,8 @@ NOTES = (
     "fitted numbers leave open. Neither says whether model and rock are right.",
     "off and criterion are shares of the measured number; of a restitution, differences.",
     "What is fitted is no success: a fit has as many parameters as numbers.",
+    "(rock): half or twice the rock's stiffness, or what its unloading ratio is above 1, moves the "
+    "number by more than the criterion. (masses): they do not, so it says little of the rock.",
 )
 
 
@@ -98,7 +102,8 @@ def verdict_text(row: Row) -> str:
     """Whether a number was fitted or predicted, and what its criterion says."""
     if row.verdict in (FITTED, NO_CRITERION):
         return row.role
-    return f"{row.role}, {row.verdict}"
+    by = f" ({row.decided_by})" if row.decided_by else ""
+    return f"{row.role}, {row.verdict}{by}"
 
 
 def cells(row: Row) -> list[str]:
@@ -132,9 +137,13 @@ def parameters_text(found: FoundFit) -> str:
 
 def count_text(found: Comparison) -> str:
     """How many predicted numbers met their criteria."""
+    once = found.counts_once()
     texts = [
-        "Each number counts once for a law, however many fits predict it; a restitution does not "
-        "count beside the two speeds that it is the quotient of."
+        "Each measured number counts once, however many fits and laws predict it; a restitution "
+        "does not count beside the two speeds that it is the quotient of.",
+        f"The masses decide {_counted(once[MASSES])}",
+        f"The rock decides {_counted(once[ROCK])}",
+        "By law, where a number of both counts for each:",
     ]
     texts += [f"Law {law}: {_counted(found.counts(law))}" for law in found.laws]
     again = found.counts(anew=True)
