@@ -17,6 +17,8 @@ from percussion_model.physics.kernel import inlined
 # Tried on single craters of Kuru granite and St Anne limestone, and on the bottom of a hole
 # drilled by a bit of 17 buttons (docs/breaking.md).
 CRUSHING_ENERGY, THRESHOLD, EFFICIENCY = 5.5e7, 5.0, 0.64
+# Less than this by volume counts as none: a volume by it might overflow [J/m^3].
+LEAST_ENERGY = 1.0
 
 
 @inlined
@@ -38,10 +40,16 @@ def flushed(par, volume):
 
 
 @inlined
+def crushed_here(s):
+    """Energy that the present loading has crushed at this place [J]."""
+    return s.crushed - s.crushed_before
+
+
+@inlined
 def broken(par, s):
     """Volume that the present loading breaks [m^3]."""
     threshold = max(par.breaking_buttons * par.breaking_threshold, s.breaking_taken)
-    beyond = max(s.breaking_crushed + s.crushed - threshold, 0.0)
+    beyond = max(s.breaking_crushed + crushed_here(s) - threshold, 0.0)
     beyond -= max(s.breaking_crushed - threshold, 0.0)
     return sharpness(par, s) * beyond / par.breaking_crushing_energy
 
@@ -49,21 +57,22 @@ def broken(par, s):
 @inlined
 def gained(par, s, deeper):
     """Advance of the hole by the present loading [m], which presses the buttons in deeper."""
-    if par.breaking_crushing_energy == 0.0:
+    if par.breaking_crushing_energy < LEAST_ENERGY:
         return deeper
     before = s.breaking_under_way
     volume = flushed(par, before + broken(par, s)) - flushed(par, before)
-    return min(volume / par.hole_area, deeper)
+    # found late, a peak may lie just above the beginning
+    return max(min(volume / par.hole_area, deeper), 0.0)
 
 
 @inlined
 def end_loading(par, s, advance):
     """Book what a loading broke, at its peak."""
-    if par.breaking_crushing_energy > 0.0:
+    if par.breaking_crushing_energy >= LEAST_ENERGY:
         volume = broken(par, s)
         s.breaking_limited += max(volume - advance * par.hole_area, 0.0)
         s.breaking_under_way += volume
-    s.breaking_crushed += s.crushed
+    s.breaking_crushed += crushed_here(s)
     s.breaking_volume += advance * par.hole_area
 
 

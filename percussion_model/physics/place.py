@@ -14,7 +14,7 @@ from percussion_model.physics.feed import feed_on_bit, note_recoil
 from percussion_model.physics.kernel import composed, inlined, merged
 from percussion_model.physics.power_law import unflushed
 from percussion_model.physics.records import Cuttings
-from percussion_model.physics.rock import is_loading
+from percussion_model.physics.rock import is_loading, leave_pit, pressed_depth
 
 
 @composed
@@ -99,9 +99,12 @@ def lift_bit(par, s, feed, push, way):
 
 @merged
 def move_place(par, s, time):
-    """Move the bit on to the place of the blow that begins at `time`; not while it loads rock."""
-    period = time - s.place_time
-    if (par.places == 0 and par.on_casing == 0) or period <= 0.0 or is_loading(s):
+    """Move the bit on to the place of the blow that begins at `time`.
+
+    A loading under way is parted there; where its line would change, the next blow moves the bit.
+    """
+    period, loads = time - s.place_time, is_loading(s)
+    if (par.places == 0 and par.on_casing == 0) or period <= 0.0 or (loads and par.left == 1):
         return
     push = (s.i_drive - s.place_drive) / period
     s.place_time, s.place_drive = time, s.i_drive
@@ -110,6 +113,9 @@ def move_place(par, s, time):
         note_recoil(par, s, push)
     if par.places == 0:
         return
+    if loads:
+        leave_pit(par, s)
+        s.crushed_before, s.cycle_depth = s.crushed, pressed_depth(par, s)
     kept = kept_of(par, s, period)
     if par.cuttings == Cuttings.BY_BLOW and s.p_u > 0.0:
         kept = unflushed(par, s.p_u) / s.p_u

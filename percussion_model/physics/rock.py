@@ -185,7 +185,7 @@ def _or_less(before: Callable, one: Component) -> Callable:
     def gained(par: Any, s: Any, deeper: float) -> float:
         least = before(par, s, deeper)
         if par[present] == 1:
-            least = min(least, gain(par, s, deeper))
+            least = gain(par, s, least)
         return least
 
     return gained
@@ -230,7 +230,7 @@ def hole_depth(par, s):
 
 @inlined
 def leave_pit(par, s):
-    """Note how much of the loading that ends the hole does not gain."""
+    """Note how much of the loading the hole does not gain: at its end, or where the bit turns."""
     deeper = pressed_depth(par, s) - s.cycle_depth
     gained = gained_of(par, s, deeper)
     s.pit += deeper - gained
@@ -267,17 +267,17 @@ def start_cycle(par, s, force):
         left = left_depth(par, s.p_u if force > 0.0 else s.p)
         start_loading(par, s, left)
         p = penetration_at(par, s, force) if force > 0.0 else left
+    if par.places == 1:
+        s.cycle_depth = pressed_depth(par, s)  # a bit found just below the surface pressed it in
     s.x_r += s.p - p
     s.p = p
     s.w = 0.0
-    s.crushed = 0.0
+    s.crushed = s.crushed_before = 0.0
     s.cycle_counted = 0
     if par.barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
         s.mode = Mode.DFC
     else:
         s.mode = Mode.FC
-    if par.places == 1:
-        s.cycle_depth = pressed_depth(par, s)
 
 
 @kernel
