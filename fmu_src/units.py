@@ -37,6 +37,7 @@ UNITS: dict[str, Unit] = {
     "m.s": Unit({"m": 1, "s": 1}, {}),
     "K": Unit({"K": 1}, {}),
     "rad": Unit({"rad": 1}, {}),
+    "rad/s": Unit({"rad": 1, "s": -1}, {"rpm": 9.549296585513721}),
     "W": Unit({"kg": 1, "m": 2, "s": -3}, {}),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {}),
     "N/s": Unit({"kg": 1, "m": 1, "s": -3}, {}),

@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 from fmu_src.hammer.inputs import DRIVE_INPUTS, PLAIN_INPUTS
 from fmu_src.hammer.motion import AT, Motion
+from fmu_src.units import fmi_unit
 from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import Mode
 
@@ -118,5 +119,15 @@ OUTPUTS: dict[str, Output] = {
     "off_bottom": Output(None, None, None, None, "whether the bit met no rock in the last communication step", lambda motion: motion.off_bottom(), "Boolean", at_start=ALL),
 }  # fmt: skip
 for _one in COMPONENTS:
-    for (_name, (_unit, _text, _)), _field in zip(_one.state.items(), _one.fields, strict=True):
-        OUTPUTS[f"{_one.name}.{_name}"] = Output(_unit, None, None, None, _text, Sample(_field))
+    for (_name, (_unit, _text, _start)), _field in zip(
+        _one.state.items(), _one.fields, strict=True
+    ):
+        OUTPUTS[f"{_one.name}.{_name}"] = Output(
+            fmi_unit(_unit),
+            -_ENERGY,
+            _ENERGY,
+            1.0,
+            _text,
+            Sample(_field),
+            at_start=(f"{_one.name}.{_start}",) if _start in _one.inputs else None,
+        )

@@ -36,7 +36,15 @@ FIRST_ROD, JOINT = 100_000, 90_000
 # Gauge pressure at which the drive gives the force of the scene [Pa].
 SUPPLY_PRESSURE = 20e5
 # Displays that people expect, by unit of the interface.
-DISPLAYS = {"m": "mm", "N": "kN", "Pa": "bar", "m2": "mm2", "Hz": "1/min", "N/m": "kN/mm"}
+DISPLAYS = {
+    "m": "mm",
+    "N": "kN",
+    "Pa": "bar",
+    "m2": "mm2",
+    "Hz": "1/min",
+    "N/m": "kN/mm",
+    "rad/s": "rpm",
+}
 DISPLAYS_OF = {"youngs_modulus": "MPa"}
 
 # What an input of the FMU stands for in the table, rock before drive; the rest of a scene

@@ -74,6 +74,15 @@ TERMINALS = (
         },
     ),
     Terminal(
+        "rotation",
+        "motor that turns the bit",
+        {
+            "rotation_speed": "rotation.speed",
+            "turning_speed": "rotation.turning_speed",
+            "rotation_torque": "rotation.torque",
+        },
+    ),
+    Terminal(
         "control",
         "what a controller of the hole measures",
         {

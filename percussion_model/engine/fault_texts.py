@@ -66,7 +66,8 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.FEM_FIELD: _of_field(FEM_LIMITS.names),
         Fault.RIGID_FIELD: _of_field(RIGID_LIMITS.names),
     }
-    more = [*(_of_state(text) for text in MODAL_FAULTS[1:]), *map(_of_rule, TEXTS.values())]
+    rules = (_of_rule(TEXTS[rule]) for rule in sorted(TEXTS))
+    more = [*(_of_state(text) for text in MODAL_FAULTS[1:]), *rules]
     texts |= {Fault.MODAL_STATE + k: text for k, text in enumerate(more)}
     return ("", *(texts[k] for k in range(1, 1 + len(texts))))
 

@@ -74,7 +74,7 @@ def test_units_are_what_they_are_made_of():
     dimension["J"] = (2, 1, -2)
     dimension["Pa"] = (-1, 1, -2)
     dimension["W"] = (2, 1, -3)
-    dimension["Hz"] = (0, 0, -1)
+    dimension["Hz"], dimension["rad"] = (0, 0, -1), (0, 0, 0)
     dimension["m2"], dimension["m3"], dimension["s2"] = (2, 0, 0), (3, 0, 0), (0, 0, 2)
     for name, unit in UNITS.items():
         if name in ("1", "K", "rad"):

@@ -66,6 +66,31 @@ def test_contradictions_fail_in_the_initialisation(make):
     fails(instance, instance.start, "solver.accuracy = 0.001", "solver.cells = 40", "one of them")
 
 
+TURNS = {"effects.rotation": True, "rotation.mean_radius": 0.03}
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"effects.breaking": True}, "needs hole_diameter"),
+        ({"effects.breaking": True, "hole_diameter": 0.1}, "needs breaking.buttons"),
+        ({"effects.rotation": True}, "needs rotation.mean_radius"),
+        (
+            {**TURNS, "rotation.old_line": True, "effects.cuttings": True},
+            "rotation.old_line and effects.cuttings both say",
+        ),
+        (
+            {**TURNS, "rotation.full_torque": 500.0, "rotation.stall_torque": 400.0},
+            "must be at most rotation.stall_torque = 400.0 N m",
+        ),
+    ],
+)
+def test_contradictions_of_breaking_and_rotation_are_refused_as_well(make, values, words):
+    instance = make(start=False)
+    instance.set(values)
+    fails(instance, instance.start, words)
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

@@ -50,6 +50,31 @@ WIDE: dict[str, tuple[Any, ...]] = {
     "fem.event_tolerance": (1e-12, 0.1),
     "fem.time_tolerance": (1e-9, 0.1),
 }
+# Of the advance by breaking, a bit that turns and the casing, which are drawn last: what is drawn
+# before stays what it was without them.
+ADVANCE: dict[str, tuple[Any, ...]] = {
+    "hole_diameter": (1e-3, 10.0),
+    "feed.casing_mass": (1e-2, 1e4, ZERO),
+    "breaking.buttons": (1.0, 1000.0),
+    "breaking.crushing_energy": (1e3, 1e11, ZERO),
+    "breaking.threshold": (1e-6, 1e5, ZERO),
+    "breaking.efficiency": (1e-6, 1.0, ZERO),
+    "breaking.wear_length": (1e-6, 1e5, ZERO),
+    "breaking.worn": (1e-3, 1.0, ZERO),
+    "breaking.drilled": (1e-6, 1e5, ZERO),
+    "breaking.flushed_volume": (1e-12, 1.0, ZERO),
+    "rotation.speed": (1e-6, 1e4, ZERO),
+    "rotation.mean_radius": (1e-4, 10.0),
+    "rotation.renewal_length": (1e-6, 1.0, ZERO),
+    "rotation.friction": (1e-4, 10.0, ZERO),
+    "rotation.stall_torque": (1e-3, 1e8, ZERO),
+    "rotation.full_torque": (1e-3, 1e8, ZERO),
+    "rotation.response": (1e-6, 1e3, ZERO),
+}
+BOUNDS = WIDE | ADVANCE
+SWITCHES = ("effects.breaking", "effects.rotation")
+# What a scene with breaking or rotation has to be given.
+NO_DEFAULT = ("hole_diameter", "breaking.buttons", "rotation.mean_radius")
 BY_SOLVER = {"wave": "solver", "fem": "fem", "rigid": "contact"}
 SECTION = {
     "length": (0.005, 5.0),
@@ -73,7 +98,7 @@ def any_number(source: Source, key: str, row: Any, reach: str) -> float | None:
     kind = source.pick(("default", "near", "wide", "wide", "bound" if reach == "any" else "near"))
     if kind == "default":
         return row.default
-    low, high, *more = WIDE[key]
+    low, high, *more = BOUNDS[key]
     if kind == "near" and row.default:
         value = row.default * NEAR ** source.between(-1.0, 1.0)
         return value if row.allows(value) else row.default
@@ -119,6 +144,9 @@ def sections(source: Source, reach: str, base: float) -> list[dict[str, float]]:
 MOST_CELLS = 48
 MOST_CELL_STEPS = 2e5
 MOST_STEPS = 20_000
+# Rock met again springs back whole, so that a light bit without a barrier rings on, with two
+# events in each turn [s].
+LONGEST_RINGING = 0.1
 
 
 @dataclass
@@ -160,7 +188,14 @@ def draw_case(source: Source, reaches: tuple[str, ...] = ("near", "wide", "wide"
     length = draw_length(source, scene)
     # no run of this kind looks at these, but they must fit each other
     scene = scene.replace(**{"run.duration": min(max(length, 1e-300), 1e6), "run.settle": 0.0})
-    return Case(scene, length, draw_calls(source, scene, reach), reach)
+    calls = draw_calls(source, scene, reach)
+    scene = with_advance(source, scene, reach)
+    if scene.effects.rotation and chance(source, 50):
+        speed = number(source, "rotation.speed", reach)
+        calls.append((source.between(0.0, 1.0), "inputs", {"rotation_speed": speed}))
+    if scene.effects.rotation and scene["rotation.old_line"]:
+        length = min(length, LONGEST_RINGING)
+    return Case(scene, length, sorted(calls, key=lambda call: call[0]), reach)
 
 
 def draw_scene(source: Source, reach: str) -> Scene:
@@ -201,6 +236,26 @@ def draw_scene(source: Source, reach: str) -> Scene:
         changes["piston.sections"] = sections(source, reach, 0.175)
     changes["solver.leaps"] = not chance(source, 25)
     return with_cells(source, Scene().replace(**changes), solver)
+
+
+def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
+    """The scene with any of breaking, rotation and a casing under the feed."""
+    changes: dict[str, Any] = {"feed.on": source.pick(("bit", "casing"))}
+    for key in ADVANCE:
+        value = number(source, key, reach)
+        if value is not None:
+            changes[key] = value
+        elif key in NO_DEFAULT:
+            changes[key] = round(decades(source, 1.0, 100.0)) if "buttons" in key else 0.1
+    if changes["rotation.stall_torque"] > 0.0:
+        most = changes["rotation.stall_torque"]
+        changes["rotation.full_torque"] = min(changes["rotation.full_torque"], most)
+    crushed = scene.effects.rock in ("bilinear", "power")
+    changes |= {key: crushed and chance(source, 50) for key in SWITCHES}
+    # without a barrier nothing damps a bit on its old line, and modes list each of its turns
+    rings = scene.solver_name == "modal" and not scene.barrier_on
+    changes["rotation.old_line"] = not (scene.effects.cuttings or rings) and chance(source, 40)
+    return scene.replace(**changes)
 
 
 def with_cells(source: Source, scene: Scene, solver: str) -> Scene:

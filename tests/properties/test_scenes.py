@@ -13,7 +13,7 @@ from percussion_model import Scene, SceneError, Simulation
 from percussion_model.scene.parameters import rows_by_key
 from tests.properties import checks
 from tests.properties.campaign import campaign, run_case
-from tests.properties.scenes import BOTH_SIGNS, WIDE, ZERO, Case, draw_case
+from tests.properties.scenes import BOTH_SIGNS, BOUNDS, ZERO, Case, draw_case
 from tests.properties.source import Generator
 
 SHORT_COUNT, LONG_COUNT, SEED = 200, 20_000, 2026
@@ -99,7 +99,7 @@ def test_cases_cover_solvers_effects_and_parameters():
             found = {scene[key] for scene in scenes}
             allowed = set(row.choices) if row.kind == "choice" else {True, False}
             assert found == allowed, key
-    for key, (low, high, *more) in WIDE.items():
+    for key, (low, high, *more) in BOUNDS.items():
         values = np.array([scene[key] for scene in scenes if scene[key] is not None])
         sizes = np.abs(values[values != 0.0])
         assert sizes.min() < low * (high / low) ** 0.3, key
@@ -148,6 +148,19 @@ def test_a_sound_case_passes(rigid_case):
 def test_a_fault_is_seen(rigid_case, monkeypatch, method, change, words):
     spoil(monkeypatch, method, change)
     with pytest.raises(AssertionError, match=words):
+        checks.check_case(rigid_case)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5])
+def test_more_broken_than_crushed_is_seen(rigid_case, monkeypatch, share):
+    advance = {"effects.breaking": True, "hole_diameter": 0.1, "breaking.buttons": 1}
+    rigid_case.scene = rigid_case.scene.replace(**advance, **{"breaking.threshold": 0.0})
+    spoil(monkeypatch, "energy", lambda ledger: ledger | {"crushing": share * ledger["crushing"]})
+    monkeypatch.setattr(checks, "MOST_RESIDUAL", 1.0)
+    if share < 1.0:
+        with pytest.raises(AssertionError, match="broken more than crushed"):
+            checks.check_case(rigid_case)
+    else:
         checks.check_case(rigid_case)
 
 

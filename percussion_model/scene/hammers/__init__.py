@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 
 from percussion_model.scene.bar_groups import MOST_RODS
-from percussion_model.scene.bits import bit
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
@@ -39,19 +38,17 @@ def hammer(name: str, rods: int | None = None) -> Scene:
     if name not in hammers():
         raise SceneError(f"hammer {name!r}: must be one of {', '.join(hammers())}")
     tree = read_toml(_HERE / f"{name}.toml")
-    bars, button_bit = tree["bars"], bit(tree.pop("button_bit"))
+    bars = tree["bars"]
     if len(bars) == 2:
         if rods is not None:
             raise SceneError(f"hammer {name}: works down the hole, without rods")
-        return Scene(**tree).replace(**button_bit.parameters)
+        return Scene(**tree)
     count = USUAL_RODS if rods is None else rods
     if not 1 <= count <= MOST_RODS - 1:
         raise SceneError(f"rods = {count}: must be from 1 to {MOST_RODS - 1}")
-    piston, shank, rod, lowest = bars
+    piston, shank, rod, bit = bars
     title = f"{tree['title']}: {count} of them" if count > 1 else f"{tree['title']}: one"
-    chain = [piston, shank, *[rod] * count, lowest]
-    scene = Scene(**{**tree, "title": title, "bars": chain})
-    return scene.replace(**button_bit.parameters)
+    return Scene(**{**tree, "title": title, "bars": [piston, shank, *[rod] * count, bit]})
 
 
 def bar_test() -> Scene:

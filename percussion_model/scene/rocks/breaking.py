@@ -101,7 +101,7 @@ def on_bottom(rock: Rock, buttons: int | None) -> Rock:
     if rock.buttons is None:
         return rock
     share = CONTACT_SHARE
-    whole = rock.of_buttons(buttons or rock.buttons)
+    whole = rock if rock.asked else rock.of_buttons(buttons or rock.buttons)
     numbers = tuple(
         replace(
             one,
