@@ -1,11 +1,12 @@
 """Advance of the hole by the volume that is broken, not by what the buttons press in.
 
-Where a blow crushes the energy W, it breaks
+A loading that crushes the energy W of fresh rock breaks
 
     V = eta max(W - max(W_1, N W_0), 0) / e_c
 
-beyond the craters of the energy W_1 that are there already; so the hole gains V by its area, and
-no more than what is pressed in (docs/model.md, eq. 20g).
+beyond the craters of the energy W_1 that are there already, from blows before or from greater
+loadings of this one; so the hole gains V by its area, and no more than what is pressed in
+(docs/model.md, eq. 20g).
 """
 
 from __future__ import annotations
@@ -40,17 +41,21 @@ def flushed(par, volume):
 
 
 @inlined
-def crushed_here(s):
-    """Energy that the present loading has crushed at this place [J]."""
-    return s.crushed - s.crushed_before
+def energy_here(par, s):
+    """Crushing energy of one loading of fresh rock as far as the present one has come [J]."""
+    if par.left == 1:  # rock is crushed from where it was left
+        return s.breaking_crushed + s.crushed - s.crushed_before
+    return s.cycle_from + s.crushed
 
 
 @inlined
 def broken(par, s):
     """Volume that the present loading breaks [m^3]."""
-    threshold = max(par.breaking_buttons * par.breaking_threshold, s.breaking_taken)
-    beyond = max(s.breaking_crushed + crushed_here(s) - threshold, 0.0)
-    beyond -= max(s.breaking_crushed - threshold, 0.0)
+    known = max(par.breaking_buttons * par.breaking_threshold, s.breaking_taken)
+    known = max(known, s.breaking_crushed)
+    if s.crushed_before > 0.0 and par.left == 0:
+        known = max(known, s.cycle_from + s.crushed_before)
+    beyond = max(energy_here(par, s) - known, 0.0)
     return sharpness(par, s) * beyond / par.breaking_crushing_energy
 
 
@@ -72,7 +77,7 @@ def end_loading(par, s, advance):
         volume = broken(par, s)
         s.breaking_limited += max(volume - advance * par.hole_area, 0.0)
         s.breaking_under_way += volume
-    s.breaking_crushed += crushed_here(s)
+    s.breaking_crushed = max(s.breaking_crushed, energy_here(par, s))
     s.breaking_volume += advance * par.hole_area
 
 
@@ -130,7 +135,7 @@ COMPONENT = Component(
     },
     state={
         "volume": ("m^3", "volume broken since the start", 0.0),
-        "crushed": ("J", "energy crushed at this place, of loadings that have ended", 0.0),
+        "crushed": ("J", "crushing energy of the greatest loading at this place", 0.0),
         "taken": ("J", "energy whose craters were there when the bit came to this place", 0.0),
         "under_way": ("m^3", "volume broken in the blow under way", 0.0),
         "blow_volume": ("m^3", "volume broken in the last blow", 0.0),

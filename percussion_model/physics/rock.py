@@ -21,6 +21,8 @@ from percussion_model.physics.kernel import composed, inlined, kernel, merged
 from percussion_model.physics.power_law import (
     CHIPPING_SLOPE,
     force_and_work,
+    fresh_recovery,
+    fresh_work,
     is_chipping,
     is_reloading,
     left_depth,
@@ -255,6 +257,16 @@ def overcomes_barrier(par, s, energy):
     return barrier_off(par, s) or energy > barrier_level(par, s)
 
 
+@inlined
+def crushed_until(par, s, force):
+    """What a loading of fresh rock crushes until it has a force [N] [J]."""
+    if force <= 0.0 or par.places == 0:
+        return 0.0
+    if par.power == 0:
+        return 0.5 * force * force / s.k_r * (1.0 - 1.0 / s.gamma)
+    return fresh_work(par, s, s.p) - 0.5 * force * fresh_recovery(par, s, s.p, force)
+
+
 @kernel
 def start_cycle(par, s, force):
     """Begin a drilling cycle that starts under a force [N] (docs/model.md, eq. 19)."""
@@ -273,6 +285,7 @@ def start_cycle(par, s, force):
     s.p = p
     s.w = 0.0
     s.crushed = s.crushed_before = 0.0
+    s.cycle_from = crushed_until(par, s, force)
     s.cycle_counted = 0
     if par.barrier == 1 and s.c_r > 0.0 and s.w_r > 0.0:
         s.mode = Mode.DFC

@@ -97,6 +97,7 @@ _MOTION = [
     ("resumed_share", "f8"),  # of what it would give back of its own then
     ("crushed", "f8"),  # by this drilling cycle [J]
     ("crushed_before", "f8"),  # by it before the bit came to this place
+    ("cycle_from", "f8"),  # what fresh rock takes until it has the force of its start
     ("cycle_depth", "f8"),  # depth pressed in at which it began [m]
     ("pit", "f8"),  # depth of the craters in which the bit is [m]
     ("climb", "f8"),  # how far it has climbed out of craters [m]

@@ -308,7 +308,7 @@ HOLE_DIAMETER: ParameterRow = dataclasses.replace(
         "diameter of the hole, which tells specific energy and advance by breaking; "
         "left out: not known",
         typical=HOLE,
-        gt=0,
+        ge=1e-3,
         le=10,
     ).metadata["row"],
     key="hole_diameter",
