@@ -255,10 +255,68 @@ def test_the_bit_climbs_out_of_what_the_hole_did_not_gain():
     force = 3000.0 + 8000.0 + 31.0 * 9.81
     assert s["climb"] == pytest.approx(pit, rel=1e-12)
     assert s["pit"] == pytest.approx(0.0, abs=1e-18)
+    arc, rest = RADIUS * SPEED * 0.03, 3000.0 + 16.0 * 9.81
+    torque = RADIUS * (force * (1.0 - kept) * pit / arc + 0.4 * rest)
+    assert s["rotation_torque"] == pytest.approx(torque, rel=1e-12)
     assert s["e_climb"] == pytest.approx(force * (1.0 - kept) * pit, rel=1e-12)
     assert s["e_refill"] == pytest.approx(force * kept * pit, rel=1e-12)
     assert -(s["e_feed"] + s["e_drive"] + s["e_gravity"]) == pytest.approx(force * pit, rel=1e-12)
     assert hole_depth(par, s) == pytest.approx(depth, rel=1e-12)
+
+
+def test_on_the_old_line_pits_and_the_energy_in_them_stay():
+    par, s = make(rotation_old_line=1)
+    drop(par, s, 500.0)
+    pit, left = float(s["pit"]), float(s["p_u"])
+    kept = math.sqrt(math.exp(-RADIUS * SPEED * 0.03 / LAMBDA))
+    turn(par, s)
+    assert s["pit"] == pytest.approx(kept * pit, rel=1e-12)
+    assert s["p_u"] == pytest.approx(kept * left, rel=1e-12)
+    assert s["e_refill"] == 0.0
+    # on the line of what is left, up to the peak that is left, nothing is crushed and broken
+    first = float(s["breaking_volume"])
+    close_interface(par, s, 1.0)
+    load(par, s, 0.99 * kept * K * math.sqrt(500.0 / CRUSHING))
+    assert s["breaking_volume"] == first
+    assert s["e_crushing"] == pytest.approx(500.0, rel=1e-9)
+    s["mode"], s["p"] = Mode.FF, s["p_u"]
+    drop(par, s, 600.0)
+    volume = ETA * (600.0 - max(kept**2 * 500.0, BUTTONS * LEAST)) / ENERGY
+    assert s["breaking_volume"] - first == pytest.approx(volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.8])
+def test_what_carries_the_bit_is_left_where_it_turns(share):
+    """Its force and place stay; of the crater there is at least what the force tells."""
+    par, s = make(rotation_old_line=1)
+    close_interface(par, s, 1.0)
+    peak = 8e5 / K
+    load(par, s, 8e5)
+    left = float(s["p_u"])
+    s["p"] = left + share * (s["p"] - left)
+    force, place = float(spring_force(par, s)), float(s["x_r"] + s["p"])
+    pit = float(s["pit"])
+    s["rotation_turning_speed"] = 2.0 * LAMBDA * math.log(2.0) / (RADIUS * 0.03)  # half the depth
+    turn(par, s)
+    now = max(0.5, share)
+    assert spring_force(par, s) == pytest.approx(force, rel=1e-9)
+    assert s["x_r"] + s["p"] == pytest.approx(place, rel=1e-12)
+    assert s["p_u"] == pytest.approx(now * peak * (1.0 - 1.0 / GAMMA), rel=1e-9)
+    assert s["pit"] == pytest.approx(now * pit, rel=1e-9)
+
+
+def test_the_hole_gets_deeper_while_rock_is_loaded():
+    par, s = make()
+    close_interface(par, s, 1.0)
+    depths = []
+    for energy in (50.0, 100.0, 300.0, 500.0):
+        before, s["p"] = float(s["p"]), math.sqrt(energy / CRUSHING)
+        crush(par, s, before)
+        depths.append(float(hole_depth(par, s)))
+        wanted = ETA * max(energy - BUTTONS * LEAST, 0.0) / ENERGY / AREA
+        assert depths[-1] == pytest.approx(wanted, rel=1e-9, abs=1e-18)
+    end_loading(par, s)
+    assert hole_depth(par, s) == pytest.approx(depths[-1], rel=1e-9)
 
 
 def test_lifting_a_bit_costs_what_holds_it_down():
@@ -283,6 +341,20 @@ def test_torque_lifts_the_bit_and_rubs(climb):
     assert s["e_turning"] == pytest.approx(0.4 * 3000.0 * arc, rel=1e-12)
     # the work of the torque over its angle is climb and friction
     assert torque * SPEED * 0.03 == pytest.approx(11000.0 * climb + s["e_friction"], rel=1e-12)
+
+
+def test_a_bit_at_rest_needs_the_torque_at_which_it_would_begin_to_climb():
+    """The slope of the first way: of a pit c the share s/(2 lambda) is left in a small arc."""
+    par, s = make()
+    s["pit"], s["rotation_turning_speed"] = 4e-4, 0.0
+    turn_on(par, s, 0.03, 1.0, 3000.0, 11000.0, 0.0)
+    at_rest = float(s["rotation_needed_torque"])
+    slope = 4e-4 / (2.0 * LAMBDA)
+    assert at_rest == pytest.approx(RADIUS * (11000.0 * slope + 0.4 * 3000.0), rel=1e-12)
+    s["rotation_turning_speed"] = 1e-6
+    climb = 4e-4 * (1.0 - float(kept_of(par, s, 0.03)))
+    turn_on(par, s, 0.03, 1.0, 3000.0, 11000.0, climb)
+    assert s["rotation_needed_torque"] == pytest.approx(at_rest, rel=1e-4)
 
 
 @pytest.mark.parametrize(
