@@ -49,10 +49,11 @@ def test_solvers_and_effects_of_the_stored_scenes():
         for name in ("reference", "drop_test", "rigid", "undamped")
     )
     every = ("gravity", "feed", "drive", "loss", "barrier", "rock")
+    turns = ("breaking", "rotation")
     assert (reference.solver_name, reference.effects_on) == ("modal", every)
-    assert (drop.solver_name, drop.effects_off) == ("modal", ("drive", "cuttings"))
-    assert (rigid.solver_name, rigid.effects_off) == ("rigid", ("loss", "cuttings"))
-    assert (undamped.solver_name, undamped.effects_off) == ("wave", ("loss", "cuttings"))
+    assert (drop.solver_name, drop.effects_off) == ("modal", ("drive", "cuttings", *turns))
+    assert (rigid.solver_name, rigid.effects_off) == ("rigid", ("loss", "cuttings", *turns))
+    assert (undamped.solver_name, undamped.effects_off) == ("wave", ("loss", "cuttings", *turns))
 
 
 # ------------------------------------------------------------------ round trip

@@ -7,6 +7,7 @@ import pytest
 
 from percussion_model.scene import solver_names
 from percussion_model.scene.parameters import (
+    COMPONENTS,
     GROUPS,
     Component,
     Effects,
@@ -60,7 +61,7 @@ def test_a_name_is_registered_once(names):
 
 
 def test_an_effect_brings_a_switch_and_a_group():
-    groups = groups_with([FRICTION])
+    groups = groups_with([*COMPONENTS, FRICTION])
     assert list(groups) == [*GROUPS, "friction"]
     rows = {row.key: row for row in table_of(groups)}
     assert rows["effects.friction"].default is False
@@ -76,7 +77,9 @@ def test_an_effect_brings_a_switch_and_a_group():
 
 
 def test_the_table_is_as_it_was_without_additions():
-    assert groups_with([]) == GROUPS
+    groups = groups_with(COMPONENTS)
+    assert [group.rows for group in groups.values()] == [one.rows for one in GROUPS.values()]
+    assert list(groups) == list(GROUPS)
 
 
 @pytest.mark.parametrize("name", ["gravity", "rock", "friction"])

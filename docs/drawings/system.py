@@ -71,6 +71,9 @@ ROUTES = {
     ("controller", "supply"): Route(((16.0, TOP), (16.0, BOTTOM)), (15.85, 3.4), "right"),
     ("supply", "controller"): Route(((17.1, BOTTOM), (17.1, TOP)), (17.25, 3.2), "left"),
     ("rig", "string"): Route(((3.6, 4.9), (5.9, 4.9)), (4.75, 4.65), "center"),
+    ("rig", "hammer"): Route(
+        ((2.5, LOW), (2.5, 6.95), (10.5, 6.95), (10.5, LOW)), (2.65, 7.25), "left"
+    ),
     ("string", "rig"): Route(((5.9, 5.9), (3.6, 5.9)), (4.75, 6.15), "center"),
     ("string", "hammer"): Route(((8.2, 4.9), (10.2, 4.9)), (9.2, 4.65), "center"),
     ("hammer", "string"): Route(((10.2, 5.7), (8.2, 5.7)), (9.2, 5.95), "center"),

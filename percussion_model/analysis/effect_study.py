@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from percussion_model.analysis.change import Change, change_of
-from percussion_model.components import COMPONENTS
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.error_estimate import LARGE
 from percussion_model.simulation.rate import LEAST_BLOWS
@@ -126,7 +126,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     """Go through the scene as it is, then one effect after the other."""
     effects = scene.effects
     yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
-    for name in ("gravity", "feed", *(one.name for one in COMPONENTS)):
+    for name in ("gravity", "feed", *(one.name for one in COMPONENTS if _can_turn(scene, one))):
         yield _switched(name, getattr(effects, name))
     yield from _drive(scene)
     yield from _rock(scene)
@@ -136,6 +136,16 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
         is_on = scene.solver.leaps
         # Leaps are no effect but an accelerator: a step without them is the same step.
         yield Variant(LEAPS, "off" if is_on else "on", {"solver.leaps": not is_on})
+
+
+def _can_turn(scene: Scene, one: Component) -> bool:
+    """Whether a component can be turned: it is on, or acts and has all that it needs."""
+    if scene[f"effects.{one.name}"]:
+        return True
+    acts = all(scene[key] in values for key, values in one.needs.items())
+    needed = [name for name, (default, *_) in one.parameters.items() if default is None]
+    known = [scene[f"{one.name}.{name}"] for name in needed]
+    return acts and None not in known and (one.gained is None or scene.hole_diameter is not None)
 
 
 def _switched(

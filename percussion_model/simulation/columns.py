@@ -39,6 +39,11 @@ SUMMARY_COLUMNS = (
     Column("contacts_per_blow", "", "mean number of contacts of piston and bit in a blow"),
     Column("drilling_cycles_per_blow", "", "mean number of drilling cycles in a blow"),
     Column("standstill_bit_force", "N", "mean bit force at the end of a standstill"),
+    *(
+        Column(column.name, column.unit, f"mean of: {column.meaning}")
+        for column in BLOW_COLUMNS
+        if column.of
+    ),
     Column("blow_frequency", "Hz", "one divided by the mean blow period"),
     Column("transfer_efficiency", "", "energy into the rock divided by the blow energy, of sums"),
     Column("mean_bit_force", "N", "impulse of the bit force divided by time"),
@@ -51,11 +56,6 @@ SUMMARY_COLUMNS = (
         "specific_energy",
         "J/m^3",
         "blow energy divided by the volume drilled, a hole of `hole_diameter`; none without it",
-    ),
-    *(
-        Column(column.name, column.unit, f"mean of: {column.meaning}")
-        for column in BLOW_COLUMNS
-        if column.of
     ),
     Column("standard_errors", "as above", "errors of these numbers from the scatter of the blows"),
     Column("errors", "as above", "estimated numerical errors of these numbers, scatter included"),

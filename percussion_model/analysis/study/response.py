@@ -20,6 +20,8 @@ KINDS = ("periodic", "aperiodic", "stalled", "failed")
 COMPUTING = (
     *SOLVING,
     "scene/*.py",
+    "scene/bits/*.py",
+    "scene/rocks/*.py",
     "simulation/*.py",
     "analysis/stationary.py",
     "analysis/study/points.py",
