@@ -466,7 +466,7 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
     groups = dict(_BUILT_IN)
     switches: dict[str, Any] = {}
     for one in components:
-        if one.name in groups or one.name in switches or one.name in Effects.rows:
+        if one.name in groups or one.name in switches or one.name in _BUILT_IN["effects"].rows:
             raise ValueError(f"component {one.name}: there is a group or a switch of this name")
         if both := set(one.parameters) & set(one.state):
             raise ValueError(f"component {one.name}: {both.pop()} is a parameter and a field")
@@ -477,7 +477,8 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
             name_of_class = one.name.title().replace("_", "") + "Group"
             groups[one.name] = _group(name_of_class, Parameters, one.description, fields)
     if switches:
-        groups["effects"] = _group("Effects", Effects, Effects.__doc__, switches)
+        plain = _BUILT_IN["effects"]
+        groups["effects"] = _group("Effects", plain, plain.__doc__, switches)
     for key, group in groups.items():
         group.key = key
     return groups
