@@ -111,7 +111,9 @@ def build(path: Path = FMU) -> None:
     from fmu_src.hammer.build import build_hammer
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    build_hammer(hammer("t38", RODS), path)
+    # the hole gains what buttons press in: four times as fast as drills, which spares time
+    scene = hammer("t38", RODS).replace(**{"effects.breaking": False, "effects.rotation": False})
+    build_hammer(scene, path)
 
 
 def simulate(fmu: Path, watches: bool = True, duration: float = DURATION) -> Run:

@@ -1,12 +1,12 @@
 """Advance of the hole by the volume that is broken, not by what the buttons press in.
 
-A loading that crushes the energy W of fresh rock breaks
+A blow that crushes the energy W breaks
 
     V = eta max(W - max(W_1, N W_0), 0) / e_c
 
-beyond the craters of the energy W_1 that are there already, from blows before or from greater
-loadings of this one; so the hole gains V by its area, and no more than what is pressed in
-(docs/model.md, eq. 20g).
+beyond the craters of the energy W_1 that are there already; so the hole gains V by its area, and
+no more than what is pressed in (docs/model.md, eq. 20g). Of a further loading of one place counts
+what it crushes after reloading the rock.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from percussion_model.physics.kernel import inlined
 CRUSHING_ENERGY, THRESHOLD, EFFICIENCY = 5.5e7, 5.0, 0.64
 # Less than this by volume counts as none: a volume by it might overflow [J/m^3].
 LEAST_ENERGY = 1.0
+# Compiled code may divide where the quotient is not used, and hosts trap a division by zero.
+LEAST = 1e-30
 
 
 @inlined
@@ -28,7 +30,7 @@ def sharpness(par, s):
     if par.breaking_wear_length == 0.0:
         return par.breaking_efficiency
     drilled = par.breaking_drilled + s.breaking_volume / par.hole_area
-    fresh = exp(-drilled / par.breaking_wear_length)
+    fresh = exp(-drilled / max(par.breaking_wear_length, LEAST))
     return par.breaking_efficiency * (par.breaking_worn + (1.0 - par.breaking_worn) * fresh)
 
 
@@ -37,26 +39,29 @@ def flushed(par, volume):
     """Volume of a blow that the hole gains where flushing limits it [m^3]."""
     if par.breaking_flushed_volume == 0.0:
         return volume
-    return volume / (1.0 + volume / par.breaking_flushed_volume)
+    return volume / (1.0 + volume / max(par.breaking_flushed_volume, LEAST))
 
 
 @inlined
-def energy_here(par, s):
-    """Crushing energy of one loading of fresh rock as far as the present one has come [J]."""
-    if par.left == 1:  # rock is crushed from where it was left
-        return s.breaking_crushed + s.crushed - s.crushed_before
-    return s.cycle_from + s.crushed
+def crushed_here(par, s):
+    """Energy that the present loading adds to what this blow has crushed [J].
+
+    It reloads the rock first, elastically: of what a loading of fresh rock crushes as far, the
+    share 1/gamma of the energy crushed before.
+    """
+    crushed = s.crushed - s.crushed_before
+    if par.left == 1:  # its line reloads the rock
+        return crushed
+    return max(crushed - max(s.breaking_crushed - s.cycle_from, 0.0) / s.gamma, 0.0)
 
 
 @inlined
 def broken(par, s):
     """Volume that the present loading breaks [m^3]."""
     known = max(par.breaking_buttons * par.breaking_threshold, s.breaking_taken)
-    known = max(known, s.breaking_crushed)
-    if s.crushed_before > 0.0 and par.left == 0:
-        known = max(known, s.cycle_from + s.crushed_before)
-    beyond = max(energy_here(par, s) - known, 0.0)
-    return sharpness(par, s) * beyond / par.breaking_crushing_energy
+    beyond = max(s.breaking_crushed + crushed_here(par, s) - known, 0.0)
+    beyond -= max(s.breaking_crushed - known, 0.0)
+    return sharpness(par, s) * beyond / max(par.breaking_crushing_energy, LEAST)
 
 
 @inlined
@@ -77,7 +82,7 @@ def end_loading(par, s, advance):
         volume = broken(par, s)
         s.breaking_limited += max(volume - advance * par.hole_area, 0.0)
         s.breaking_under_way += volume
-    s.breaking_crushed = max(s.breaking_crushed, energy_here(par, s))
+    s.breaking_crushed += crushed_here(par, s)
     s.breaking_volume += advance * par.hole_area
 
 
@@ -135,7 +140,7 @@ COMPONENT = Component(
     },
     state={
         "volume": ("m^3", "volume broken since the start", 0.0),
-        "crushed": ("J", "crushing energy of the greatest loading at this place", 0.0),
+        "crushed": ("J", "energy crushed at this place, by loadings that have ended", 0.0),
         "taken": ("J", "energy whose craters were there when the bit came to this place", 0.0),
         "under_way": ("m^3", "volume broken in the blow under way", 0.0),
         "blow_volume": ("m^3", "volume broken in the last blow", 0.0),

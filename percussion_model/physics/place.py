@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from percussion_model.components import COMPONENTS, Component
-from percussion_model.physics.feed import feed_on_bit, note_recoil
+from percussion_model.physics.feed import LEAST, feed_on_bit, note_recoil
 from percussion_model.physics.kernel import composed, inlined, merged
 from percussion_model.physics.power_law import unflushed
 from percussion_model.physics.records import Cuttings
@@ -67,6 +67,9 @@ go_on = _no_more
 for _one in COMPONENTS:
     kept_of, go_on = _or_kept(kept_of, _one), _and_next(go_on, _one)
 
+# More energy than any [J].
+LARGEST = 1e60
+
 
 @inlined
 def renew(par, s, kept):
@@ -82,7 +85,7 @@ def renew(par, s, kept):
     s.p_u -= shift
     s.p -= shift
     s.x_r += shift
-    return s.p_u / before
+    return s.p_u / max(before, LEAST)
 
 
 @inlined
@@ -106,7 +109,7 @@ def move_place(par, s, time):
     period, loads = time - s.place_time, is_loading(s)
     if (par.places == 0 and par.on_casing == 0) or period <= 0.0 or (loads and par.left == 1):
         return
-    push = (s.i_drive - s.place_drive) / period
+    push = (s.i_drive - s.place_drive) / max(period, LEAST)
     s.place_time, s.place_drive = time, s.i_drive
     feed = feed_on_bit(par, s)
     if par.on_casing == 1:
@@ -116,9 +119,10 @@ def move_place(par, s, time):
     if loads:
         leave_pit(par, s)
         s.crushed_before, s.cycle_depth = s.crushed, pressed_depth(par, s)
+        s.cycle_from = LARGEST  # it reloads nothing
     kept = kept_of(par, s, period)
     if par.cuttings == Cuttings.BY_BLOW and s.p_u > 0.0:
-        kept = unflushed(par, s.p_u) / s.p_u
+        kept = unflushed(par, s.p_u) / max(s.p_u, LEAST)
     if par.left == 1:
         kept = renew(par, s, kept)
     climb = (1.0 - kept) * s.pit

@@ -109,14 +109,19 @@ def scatter_over(blows: np.ndarray) -> dict[str, float]:
     if len(blows) == 0:
         return {}
     ones = np.ones(len(blows))
-    pairs = {name: (blows[column], ones) for name, column in _MEANS.items()}
+    means = {
+        name: column
+        for name, column in _MEANS.items()
+        if name not in _OF_COMPONENTS or blows[column].any()
+    }
+    pairs = {name: (blows[column], ones) for name, column in means.items()}
     for name, (column, by) in _RATIOS.items():
         if float(np.sum(blows[by])) > 0.0:
             pairs[name] = blows[column], blows[by]
     values, weights = (np.array(series) for series in zip(*pairs.values(), strict=True))
     _, errors = ratios_of_sums(values, weights, _STRETCHES)
     found = dict(zip(pairs, errors.tolist(), strict=True))
-    for name, column in _MEANS.items():
+    for name, column in means.items():
         if math.isnan(found[name]):
             found[name] = _scatter_of_known(blows[column])
     found["blow_frequency"] = found["blow_period"] / float(np.mean(blows["period"])) ** 2

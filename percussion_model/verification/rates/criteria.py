@@ -17,8 +17,12 @@ Known before: the crater is 40 % too large by one energy, and more than twice as
 strengths. Hammers down the hole at 6 to 8 bar have some 70 J a blow, which is about the threshold
 of their buttons. A closed form with other numbers had been tried on 16 cases that have no source.
 
-Changed after the first comparison, against the model: where no blow breaks anything the rate is 0,
-not the nanometres that a run shows; with those, hammers down the hole met the scatter.
+Changed after the first comparison, against the model: where no blow breaks anything the rate is 0.
+Changed in the model after it, for reasons that are not these rates: the threshold is by the cube of
+the button's diameter (5 J before), as craters under similar buttons are similar; a loading of a
+place breaks what it crushes beyond the greatest before, where energies were added up, as a loading
+cut in two has to break what one does. Before, all cases had missed all four, and 18 top hammers met
+the mean (1.19), the scatter (1.47) and the factor 2 (83 %).
 """
 
 from __future__ import annotations

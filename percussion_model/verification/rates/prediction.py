@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.analysis.stationary import Settled, settled
-from percussion_model.components.breaking import EFFICIENCY, THRESHOLD
+from percussion_model.components.breaking import EFFICIENCY
 from percussion_model.scene.bits import (
     COUNT,
     HOLE,
@@ -34,8 +34,8 @@ from percussion_model.verification.rates.cases import DOWN, TOP, Case
 
 # Unloading ratio that the library of rocks has where none is known, and its interval.
 RATIO = (5.0, 2.5, 15.0)
-# Intervals of crushing energy, by its value, and of the threshold [J], as for those rocks.
-ENERGY_SHARES, THRESHOLDS = (46.0 / 55.0, 65.0 / 55.0), (2.0, 10.0)
+# Intervals of crushing energy and of the threshold, by their values, as for those rocks.
+ENERGY_SHARES, THRESHOLDS = (46.0 / 55.0, 65.0 / 55.0), (0.4, 2.0)
 RENEWAL, FRICTION = 2e-3, 0.4
 # The ready-made hammer that a top hammer's bars and damper are of: bits to this diameter [m] have
 # T38 rods, wider ones T45.
@@ -121,7 +121,6 @@ def rock_parameters(case: Case) -> dict[str, Any]:
         STIFFNESS: CONTACT_SHARE.value * count * of_one,
         "rock.unloading_ratio": RATIO[0],
         "breaking.crushing_energy": energy_by_strength(case.strength),
-        "breaking.threshold": THRESHOLD,
         "breaking.efficiency": EFFICIENCY,
         "rotation.renewal_length": RENEWAL,
         "rotation.friction": FRICTION,
@@ -197,13 +196,13 @@ def predict(case: Case) -> Prediction:
     if found.kind == STALLED:
         return _nothing(scene, case, rounds, str(found.motion))
     rows = found.counted
-    crushed = float(np.mean(rows["rock_energy"]))
+    crushed = greatest_loading(scene, rows)
     frequency = found.means["blow_frequency"]
     kept = math.exp(-float(np.mean(rows["rotation_index"])) / scene["rotation.renewal_length"])
     closed = frequency * advance(scene, crushed, kept)
     low, high = (frequency * one for one in interval(scene, crushed, kept))
     # bits in contact that break nothing sink by nanometres a blow, by rounding of their cycles
-    rate = found.rate_of_penetration if np.any(rows["breaking_last"] > 0.0) else 0.0
+    rate = found.rate_of_penetration if np.any(rows["breaking_blow_volume"] > 0.0) else 0.0
     return Prediction(
         rate=rate, numerical_error=found.rate_of_penetration_error, low=low, high=high,
         closed_form=closed, blow_energy=float(np.mean(rows["blow_energy"])), frequency=frequency,
@@ -212,6 +211,17 @@ def predict(case: Case) -> Prediction:
         without_threshold=frequency * advance(scene, crushed, kept, threshold=0.0),
         bit=nearest_bit(case).name, rounds=rounds, motion=str(found.motion),
     )  # fmt: skip
+
+
+def greatest_loading(scene: Scene, rows: np.ndarray) -> float:
+    """Crushing energy of a blow's greatest loading, by what it breaks; of one that breaks
+    nothing all that it gives the rock [J]."""
+    volume = float(np.mean(rows["breaking_blow_volume"]))
+    if volume == 0.0:
+        return float(np.mean(rows["rock_energy"]))
+    threshold = scene[COUNT] * scene["breaking.threshold"]
+    beyond = volume * scene["breaking.crushing_energy"] / scene["breaking.efficiency"]
+    return float(beyond + threshold)
 
 
 def _nothing(scene: Scene, case: Case, rounds: int, motion: str) -> Prediction:
@@ -254,10 +264,10 @@ def interval(scene: Scene, crushed: float, kept: float) -> tuple[float, float]:
     """
     here = advance(scene, crushed, kept)
     energy = scene["breaking.crushing_energy"]
-    loading = crushed / (1.0 - 1.0 / RATIO[0])
+    loading, own = crushed / (1.0 - 1.0 / RATIO[0]), scene["breaking.threshold"]
     moved = [
         [advance(scene, crushed, kept, energy=share * energy) for share in ENERGY_SHARES],
-        [advance(scene, crushed, kept, threshold=one) for one in THRESHOLDS],
+        [advance(scene, crushed, kept, threshold=one * own) for one in THRESHOLDS],
         [advance(scene, loading * (1.0 - 1.0 / one), kept) for one in RATIO[1:]],
     ]
     down = math.hypot(*(here - min(here, *pair) for pair in moved))
