@@ -237,7 +237,7 @@ def advance(
     energy: float | None = None,
     threshold: float | None = None,
 ) -> float:
-    """Advance of a blow that crushes so much [m]: eqs 20f and 20g of docs/model.md.
+    """Advance of a blow that crushes so much [m]: eqs 20g and 20h of docs/model.md.
 
     Parameters
     ----------
