@@ -25,7 +25,7 @@ from tests.commands import percussion
 
 COUNT, SHARE = "breaking.buttons", 0.5
 UNDER_BIT = Scene().replace(**bit("dth-140").parameters)
-ENERGY = "breaking.crushing_energy"
+ENERGY, THRESHOLD = "breaking.crushing_energy", "breaking.threshold"
 
 
 @pytest.fixture(autouse=True)
@@ -113,7 +113,11 @@ def test_a_rock_under_a_bit_has_half_the_stiffness_of_its_buttons_and_its_crater
     assert found[STIFFNESS] == pytest.approx(full, rel=1e-12)
     assert found[COUNT] == 17
     numbers = breaking_numbers(one)
-    assert {number.key: number.value for number in numbers}.items() <= found.items()
+    own = {number.key: number.value for number in numbers}
+    own[THRESHOLD] *= (bit("dth-140").button_diameter / 17.02e-3) ** 3
+    assert own.keys() <= found.keys()
+    for key, value in own.items():
+        assert found[key] == pytest.approx(value, rel=1e-12), key
     for number in numbers:
         assert number.low <= number.value <= number.high
         assert number.kind in KINDS
@@ -126,6 +130,9 @@ def test_so_many_buttons_asked_for_are_as_many_of_the_bit(name):
     asked = parameters_under(read_rock(f"{name}:10"), UNDER_BIT)
     ten = parameters_under(rock(name), UNDER_BIT.replace(**{COUNT: 10}))
     assert set(asked) == set(ten)
+    # no bit of a name has ten buttons, so no size of them is known
+    assert ten.pop(THRESHOLD) == 5.0
+    assert asked[THRESHOLD] == bit("dth-140").parameters[THRESHOLD]
     for key, value in ten.items():
         assert asked[key] == (value if isinstance(value, str) else pytest.approx(value)), key
     assert on_bottom(read_rock(f"{name}:10"), 10).number(STIFFNESS).value == pytest.approx(

@@ -79,7 +79,8 @@ def test_a_dissipative_cycle_that_turns_within_a_step_goes_on():
             "rock.unloading_ratio": 27.08890502274836, "feed.force": 2479.5789572511712,
             "drive.reversal_distance": 0.011158315160164165,
             "drive.force": 4591.363851278547,
-            "effects.cuttings": True, "solver.name": "modal", "solver.cells": 80,
+            "effects.cuttings": True, "rock.removed_by": "cycle",
+            "solver.name": "modal", "solver.cells": 80,
         }
     )  # fmt: skip
     run = Simulation(scene)

@@ -10,7 +10,6 @@ from percussion_model.scene.parameters import (
     COMPONENTS,
     GROUPS,
     Component,
-    Effects,
     find_row,
     groups_with,
     table_of,
@@ -69,7 +68,9 @@ def test_an_effect_brings_a_switch_and_a_group():
     assert (force.default, force.lower, force.upper, force.unit) == (50.0, 0.0, 1e6, "N")
     assert force.effect == "effects.friction = true"
     effects = groups["effects"](friction=True)
-    assert isinstance(effects, Effects)
+    assert isinstance(effects, GROUPS["effects"].__base__)
+    # one more switch than the effects of all scenes
+    assert list(groups["effects"].rows) == [*GROUPS["effects"].rows, "friction"]
     assert effects.friction
     assert effects.gravity
     with pytest.raises(SceneError, match=r"friction\.force = -1 N: must be a number from 0"):
@@ -101,7 +102,8 @@ import sys
 from percussion_model import components
 from percussion_model.scene import parameters
 friction = {"force": (50.0, "N", "F", 0.0, 1e6)}
-components.COMPONENTS = (components.Component("friction", "rub", friction, max),)
+one = components.Component("friction", "rub", friction, max)
+components.COMPONENTS = (*components.COMPONENTS, one)
 parameters.GROUPS.update(parameters.groups_with(components.COMPONENTS))
 from percussion_model.scene.scene import Scene
 scene = Scene().replace(**{"friction.force": 60.0})

@@ -144,14 +144,15 @@ class Rig:
     pit: float = 0.0
     hole: float = 0.0
     taken: float = 0.0
-    crushed: float = 0.0
+    crushed: float = 0.0  # by the greatest loading at this place
     cycle: tuple[float, float] = (0.0, 0.0)  # surface and peak where this cycle began
+    parted: float = 0.0  # crushed by the loading under way before it came to this place
     volume: float = 0.0
     turning: float = 0.0
     torque: float = 0.0
     index: float = 0.0
     last: float = 0.0
-    of_blow: float = 0.0
+    under_way: float = 0.0
     rows: list[dict[str, float]] = field(default_factory=list)
     start: tuple[float, float] | None = None  # time and hole of the blow under way
 
@@ -390,7 +391,7 @@ class Rig:
         self.mode, self.peak = "loading", peak
         self.surface = self.x - peak / self.law.ratio
         self.damped, self.spent = self.law.barrier is not None, 0.0
-        self.cycle = (self.surface, peak)
+        self.cycle, self.parted = (self.surface, peak), 0.0
 
     def kink(self) -> None:
         self.begin(self.peak)
@@ -410,25 +411,35 @@ class Rig:
         if self.mode == "reloading":
             self.mode = "elastic"
             return
+        self.book()
+        self.mode = "elastic"
+
+    def book(self) -> None:
+        """Note what the loading has broken."""
         energy, volume, gained = self.gained()
-        self.crushed += energy
+        self.crushed = max(self.crushed, energy)
         self.under_way += volume
         self.volume += gained * self.law.area
         self.hole += gained
         self.pit += self.surface - self.cycle[0] - gained
-        self.mode = "elastic"
 
     def gained(self) -> tuple[float, float, float]:
-        """Energy, volume and advance of the loading so far."""
+        """Energy that the loading tells of so far, its volume and its advance.
+
+        Fresh rock has taken what leads to this peak, however the bit came there; on the old line
+        it is crushed from where it was left.
+        """
         one, (surface, before) = self.law, self.cycle
         share = 0.5 * one.stiffness * (1.0 - 1.0 / one.ratio)
-        energy = share * (self.peak**2 - before**2)
+        if one.old_line:
+            energy = self.crushed + share * (self.peak**2 - before**2)
+        else:
+            energy = share * self.peak**2
         deeper = self.surface - surface
         if one.energy == 0.0:
             return energy, 0.0, deeper
-        least = max(one.buttons * one.threshold, self.taken)
-        beyond = max(self.crushed + energy - least, 0.0) - max(self.crushed - least, 0.0)
-        volume = one.efficiency * beyond / one.energy
+        known = max(one.buttons * one.threshold, self.taken, self.crushed, self.parted)
+        volume = one.efficiency * max(energy - known, 0.0) / one.energy
         return energy, volume, min(volume / one.area, deeper)
 
     # blows
@@ -437,7 +448,7 @@ class Rig:
         return self.hole + (self.gained()[2] if self.mode == "loading" else 0.0)
 
     def begin_blow(self) -> None:
-        if self.mode not in ("loading", "reloading"):
+        if not (self.law.old_line and self.mode in ("loading", "reloading")):
             self.move_on()
         self.armed = False
         if self.start is not None:
@@ -459,6 +470,10 @@ class Rig:
         feed = self.feed
         if one.casing is not None:
             self.recoil = push / self.throttled
+        if self.mode == "loading":  # it goes on at the next place
+            energy = self.gained()[0]
+            self.book()
+            self.cycle, self.parted = (self.surface, self.cycle[1]), energy
         arc = one.radius * self.turning * period
         kept = math.exp(-0.5 * arc / one.renewal)  # of depth; of energy the square
         if one.old_line and self.peak > 0.0:

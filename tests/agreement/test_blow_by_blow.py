@@ -23,6 +23,12 @@ CLOSE = 1e-6
 CASES = {
     "feed on the bit": (REFERENCE, 0.3, {"breaking.threshold": 1.0}, 50),
     "without a barrier": (REFERENCE, 0.87, {"breaking.threshold": 1.0} | OFF, 50),
+    "rock is loaded where blows begin": (
+        REFERENCE,
+        0.87,
+        {"breaking.threshold": 0.0, "feed.force": 3e4} | OFF,
+        25,
+    ),
     "feed on the casing": (HAMMER, 0.87, {}, 50),
     "much feed": (HAMMER, 0.87, {"feed.force": 44000.0}, 50),
     "below recoil": (HAMMER, 0.87, {"feed.force": 5000.0}, 25),

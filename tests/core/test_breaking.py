@@ -49,7 +49,7 @@ def make(**changes):
     for name, value in (numbers | changes).items():
         par[name] = value
     if par["rotation_old_line"]:
-        par["power"], par["cuttings"] = 1, Cuttings.INDEXED
+        par["power"], par["cuttings"], par["left"] = 1, Cuttings.INDEXED, 1
     s["mode"], s["k_r"], s["next_k_r"], s["gamma"], s["next_gamma"] = Mode.FF, K, K, GAMMA, GAMMA
     s["rotation_speed"] = s["rotation_turning_speed"] = SPEED
     s["feed"] = 3000.0
@@ -133,7 +133,7 @@ def test_flushing_takes_so_much_of_the_volume_of_a_blow(limit):
     """g(V) = V/(1 + V/V_fl), of the whole blow in however many loadings."""
     par, s = make(breaking_flushed_volume=limit, rotation_renewal_length=0.0)
     drop(par, s, 300.0)
-    drop(par, s, 200.0)
+    drop(par, s, 500.0)
     volume = ETA * (500.0 - BUTTONS * LEAST) / ENERGY
     assert s["breaking_under_way"] == pytest.approx(volume, rel=1e-12)
     assert s["breaking_volume"] == pytest.approx(volume / (1.0 + volume / limit), rel=1e-12)
@@ -152,10 +152,11 @@ def test_wear_takes_from_the_efficiency_by_the_hole_drilled(drilled):
     assert s["breaking_volume"] == pytest.approx(volume, rel=1e-9)
 
 
+@pytest.mark.parametrize("unloaded", [0.5, 1.0])
 @pytest.mark.parametrize("first", [0.2, 0.9])
 @pytest.mark.parametrize("old_line", [0, 1])
-def test_a_loading_cut_in_two_has_the_volume_of_one(first, old_line):
-    """Unloaded in part between, and gone on from the same force, without a turn."""
+def test_a_loading_cut_in_two_has_the_volume_of_one(old_line, first, unloaded):
+    """Unloaded in part between, and gone on from the same force, or whole; without a turn."""
     one, two = make(rotation_old_line=old_line), make(rotation_old_line=old_line)
     force = K * math.sqrt(500.0 / CRUSHING)
     close_interface(*one, 1.0)
@@ -163,23 +164,41 @@ def test_a_loading_cut_in_two_has_the_volume_of_one(first, old_line):
     par, s = two
     close_interface(par, s, 1.0)
     load(par, s, first * force)
-    s["p"] -= 0.5 * (s["p"] - s["p_u"])
+    s["p"] -= unloaded * (s["p"] - s["p_u"])
     lower = float(spring_force(par, s))
-    resume_cycle(par, s)
+    if unloaded < 1.0:
+        resume_cycle(par, s)
+    else:
+        s["mode"], s["p"] = Mode.FF, s["p_u"]
+        close_interface(par, s, 1.0)
     assert spring_force(par, s) == pytest.approx(lower, rel=1e-9)
     before = float(s["p"])
-    # on the old line nothing is crushed up to the peak before; fresh rock is crushed from here on
     s["p"] = force / K
     crush(par, s, before)
     end_loading(par, s)
+    assert s["breaking_volume"] == pytest.approx(one[1]["breaking_volume"], rel=1e-9)
+    assert hole_depth(par, s) == pytest.approx(hole_depth(*one), rel=1e-9)
+    assert s["breaking_crushed"] == pytest.approx(500.0, rel=1e-9)
+    # on the old line nothing is crushed up to the peak before; fresh rock is crushed from here on
+    again = 0.0 if old_line else (first**2 - (lower / force) ** 2) * 500.0
+    assert s["e_crushing"] == pytest.approx(500.0 + again, rel=1e-9)
     if old_line:
-        assert s["breaking_volume"] == pytest.approx(one[1]["breaking_volume"], rel=1e-9)
-        assert hole_depth(par, s) == pytest.approx(hole_depth(*one), rel=1e-9)
         assert s["pit"] == pytest.approx(one[1]["pit"], rel=1e-9)
     else:
-        again = ((first * force) ** 2 - lower**2) / force**2 * 500.0
-        volume = ETA * (500.0 + again - BUTTONS * LEAST) / ENERGY
-        assert s["breaking_volume"] == pytest.approx(volume, rel=1e-9)
+        assert s["pit"] > one[1]["pit"]
+
+
+@pytest.mark.parametrize("second", [300.0, 499.0, 500.0])
+@pytest.mark.parametrize("old_line", [0, 1])
+def test_a_smaller_loading_of_the_same_place_breaks_nothing(old_line, second):
+    par, s = make(rotation_old_line=old_line)
+    drop(par, s, 500.0)
+    depth, volume = float(hole_depth(par, s)), float(s["breaking_volume"])
+    close_interface(par, s, 1.0)
+    load(par, s, K * math.sqrt(second / CRUSHING))
+    assert s["breaking_volume"] == pytest.approx(volume, rel=1e-12)
+    assert hole_depth(par, s) == pytest.approx(depth, rel=1e-9)
+    assert s["breaking_crushed"] == pytest.approx(500.0, rel=1e-9)
 
 
 def test_two_loadings_that_follow_at_one_force_have_the_volume_of_one():
@@ -319,6 +338,45 @@ def test_the_hole_gets_deeper_while_rock_is_loaded():
     assert hole_depth(par, s) == pytest.approx(depths[-1], rel=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_a_loading_is_parted_where_the_next_blow_begins(share):
+    """The bit climbs out of what the hole has not gained yet; both parts break what one does."""
+    one, two = make(), make()
+    force = K * math.sqrt(500.0 / CRUSHING)
+    close_interface(*one, 1.0)
+    load(*one, force)
+    par, s = two
+    close_interface(par, s, 1.0)
+    s["p"] = share * force / K
+    crush(par, s, 0.0)
+    part, depth = share**2 * 500.0, float(hole_depth(par, s))
+    pressed = share * force / K * (1.0 - 1.0 / GAMMA)
+    turn(par, s)
+    assert hole_depth(par, s) == pytest.approx(depth, rel=1e-9, abs=1e-18)
+    assert spring_force(par, s) == pytest.approx(share * force, rel=1e-12)
+    assert s["climb"] == pytest.approx(pressed - depth, rel=1e-9)
+    assert s["pit"] == pytest.approx(0.0, abs=1e-18)
+    volume = ETA * max(part - BUTTONS * LEAST, 0.0) / ENERGY
+    assert s["breaking_blow_volume"] == pytest.approx(volume, rel=1e-9, abs=1e-24)
+    assert s["breaking_under_way"] == 0.0
+    arc = RADIUS * SPEED * 0.03
+    assert s["breaking_taken"] == pytest.approx(part * math.exp(-arc / LAMBDA), rel=1e-9)
+    load(par, s, force)
+    assert s["breaking_volume"] == pytest.approx(one[1]["breaking_volume"], rel=1e-9)
+    assert hole_depth(par, s) == pytest.approx(hole_depth(*one), rel=1e-9)
+    assert s["pit"] + s["climb"] == pytest.approx(one[1]["pit"], rel=1e-9)
+
+
+def test_a_loading_on_the_old_line_is_not_parted():
+    par, s = make(rotation_old_line=1)
+    close_interface(par, s, 1.0)
+    s["p"] = 5e5 / K
+    crush(par, s, 0.0)
+    before = s.copy()
+    turn(par, s)
+    assert s == before
+
+
 def test_lifting_a_bit_costs_what_holds_it_down():
     par, s = make()
     s["pit"] = 3e-4
@@ -397,7 +455,8 @@ def test_rows_of_a_run_have_the_torque_of_its_formula():
         force = rest + scene.piston.mass * weight + blow["drive_impulse"] / blow["period"]
         way = (climbed[1] - climbed[0]) / force
         slope = way / blow["rotation_index"]
-        found.append(scene["rotation.mean_radius"] * (force * slope + 0.4 * rest))
+        rubbing = scene["rotation.friction"] * rest
+        found.append(scene["rotation.mean_radius"] * (force * slope + rubbing))
     assert len(found) > 8
     # of the first blow the period counts from the start of the run
     np.testing.assert_allclose(blows["rotation_torque"][1:], found[1:], rtol=1e-7)

@@ -79,6 +79,7 @@ def test_loss_changes_the_impedance_of_an_end(eta, wavelength):
         {"effects.rock": "spring", "effects.barrier": False},
         {"effects.rock": "power"},
         {"effects.cuttings": True},
+        {"effects.cuttings": True, "rock.removed_by": "cycle"},
         {"effects.loss": False},
         {"loss.time": 1e-8},
         {"bit.sections.0.length": 0.9137},

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from percussion_model import Scene, simulate
 from percussion_model.physics.curved_loading import load
+from percussion_model.physics.place import move_place
 from percussion_model.physics.power_law import (
     CHIPPING_SLOPE,
     loading_force,
@@ -18,7 +19,7 @@ from percussion_model.physics.power_law import (
     next_kink,
     part_at,
 )
-from percussion_model.physics.records import Mode, RockKind
+from percussion_model.physics.records import Cuttings, Mode, RockKind
 from percussion_model.physics.rock import (
     close_interface,
     crush,
@@ -37,8 +38,10 @@ DROP = {
     "run.settle": 0.0,
 }  # fmt: skip
 
+BY_CYCLE = {"effects.cuttings": True, "rock.removed_by": "cycle"}
 
-def make(exponent=1.0, unloading=0.0, chipping=(0.0, 0.0), removed=None):
+
+def make(exponent=1.0, unloading=0.0, chipping=(0.0, 0.0), removed=None, by=Cuttings.BY_CYCLE):
     """Parameters and state of a bit that flies right above the rock."""
     par, s = np.zeros(1, WAVE_PAR)[0], np.zeros(1, WAVE_STATE)[0]
     par["rock"], par["power"], par["buttons"] = RockKind.BILINEAR, 1, 1.0
@@ -48,7 +51,8 @@ def make(exponent=1.0, unloading=0.0, chipping=(0.0, 0.0), removed=None):
         P_0,
     )
     par["chipping_force"], par["chipping_penetration"] = chipping
-    par["cuttings"] = removed is not None
+    par["cuttings"] = Cuttings.NONE if removed is None else by
+    par["left"] = par["places"] = par["cuttings"] > Cuttings.BY_CYCLE
     par["removed_share"], par["removal_exponent"] = removed or 0.0, 1.0
     s["mode"], s["k_r"], s["next_k_r"], s["gamma"], s["next_gamma"] = Mode.FF, K, K, GAMMA, GAMMA
     return par, s
@@ -169,6 +173,67 @@ def test_blows_come_to_the_advance_of_their_energy_balance(removed):
     assert float(hole_depth(par, s)) - before == pytest.approx(advance, rel=1e-9, abs=1e-12)
 
 
+def flushed(par, depth):
+    """What flushing takes of a crater, by eq. 20d."""
+    share, exponent = float(par["removed_share"]), float(par["removal_exponent"])
+    return min(share * 1e-3 * (depth / 1e-3) ** exponent, depth)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("removal_exponent", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("removed", [0.0, 0.3, 1.0])
+def test_by_blow_flushing_leaves_the_share_of_its_law(removed, removal_exponent, exponent):
+    """All cuttings stay between the cycles of a blow; after it eq. 20d says what is left."""
+    par, s = make(exponent, removed=removed, by=Cuttings.BY_BLOW)
+    par["removal_exponent"] = removal_exponent
+    press(par, s, 300.0)
+    crater, depth, crushed = (float(x) for x in (s["p_u"], hole_depth(par, s), s["e_crushing"]))
+    press(par, s, 0.2 * 300.0 / GAMMA)  # a weak cycle of this blow comes back whole
+    assert s["e_crushing"] == pytest.approx(crushed, rel=1e-9)
+    assert s["p_u"] == pytest.approx(crater, rel=1e-9)
+    place = float(s["x_r"] + s["p_u"])
+    move_place(par, s, 0.03)
+    left = crater - flushed(par, crater)
+    assert s["p_u"] == pytest.approx(left, rel=1e-9, abs=1e-18)
+    assert s["x_r"] + s["p_u"] == pytest.approx(place, rel=1e-12)
+    assert float(hole_depth(par, s)) == pytest.approx(depth, rel=1e-9)
+    # up to the peak that would leave so much, the next blow is given back
+    if exponent == 1.0 and removed < 1.0:
+        peak = left * GAMMA / (GAMMA - 1.0)
+        for share, crushes in ((0.99, False), (1.01, True)):
+            press(par, s, share * 0.5 * K * peak**2 / GAMMA)
+            assert (s["e_crushing"] > crushed * (1.0 + 1e-9)) == crushes
+
+
+@pytest.mark.parametrize("removed", [0.3, 0.8, 1.0])
+def test_by_blow_equal_blows_of_one_cycle_advance_as_by_cycle(removed):
+    one, two = make(removed=removed), make(removed=removed, by=Cuttings.BY_BLOW)
+    for blow in range(30):
+        peaks = [press(par, s, 300.0) for par, s in (one, two)]
+        assert peaks[1] == pytest.approx(peaks[0], rel=1e-9)
+        move_place(*two, 0.03 * (blow + 1))
+        assert hole_depth(*two) == pytest.approx(hole_depth(*one), rel=1e-9)
+
+
+def test_by_blow_flushing_leaves_what_carries_the_bit():
+    par, s = make(removed=0.9, by=Cuttings.BY_BLOW)
+    close_interface(par, s, 1.0)
+    before, s["p"] = float(s["p"]), 1e-3
+    crush(par, s, before)
+    move_place(par, s, 0.01)  # rock under load stays as it is
+    assert (s["p"], s["x_r"]) == (1e-3, 0.0)
+    end_loading(par, s)
+    crater = float(s["p_u"])
+    s["p"] -= 0.5 * (s["p"] - crater)
+    force, place = float(spring_force(par, s)), float(s["x_r"] + s["p"])
+    move_place(par, s, 0.03)
+    # of a crater this deep a loading to the force has left so much
+    assert s["p_u"] == pytest.approx(force / K * (1.0 - 1.0 / GAMMA), rel=1e-9)
+    assert s["p_u"] > 0.1 * crater
+    assert spring_force(par, s) == pytest.approx(force, rel=1e-9)
+    assert s["x_r"] + s["p"] == pytest.approx(place, rel=1e-12)
+
+
 @pytest.mark.parametrize("unloading", [0.0, 0.5])
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_what_is_left_unloads_as_it_was_loaded(exponent, unloading):
@@ -258,7 +323,7 @@ def _ends(function, direction):
 @pytest.mark.parametrize("removed", [0.2, 0.7])
 def test_a_bouncing_bit_is_that_of_a_general_integrator(removed):
     scene = Scene().replace(
-        **{**DROP, "effects.cuttings": True, "rock.removed_share": removed, "run.duration": 0.08}
+        **{**DROP, **BY_CYCLE, "rock.removed_share": removed, "run.duration": 0.08}
     )
     result = simulate(scene, error_estimate=False)
     wanted = bounces(scene, removed, 3)
@@ -271,7 +336,7 @@ def test_a_bouncing_bit_is_that_of_a_general_integrator(removed):
 @pytest.mark.parametrize("cells", [24, 40])
 def test_waves_drill_with_cuttings_as_elements_do(cells):
     """By lumped masses with a law of their own, 50 and 100 in the piston: 14.853, 14.855 mm/s."""
-    changes = {"effects.cuttings": True, "rock.removed_share": 0.5, "solver.cells": cells}
+    changes = {**BY_CYCLE, "rock.removed_share": 0.5, "solver.cells": cells}
     result = simulate(Scene().computed_by("wave", **changes), 2.0, record_events=False)
     assert result.summary()["drilling_cycles_per_blow"] == 6.0
     off = abs(result.rate_of_penetration - 14.856e-3)
@@ -280,6 +345,6 @@ def test_waves_drill_with_cuttings_as_elements_do(cells):
 
 def test_full_removal_is_the_law_without_cuttings_to_the_last_bit():
     short = Scene().replace(**{"run.duration": 0.3, "run.settle": 0.1, "solver.name": "wave"})
-    full = short.replace(**{"effects.cuttings": True, "rock.removed_share": 1.0})
+    full = short.replace(**{**BY_CYCLE, "rock.removed_share": 1.0})
     plain, flushed = (simulate(one, error_estimate=False) for one in (short, full))
     assert plain.blows.tobytes() == flushed.blows.tobytes()

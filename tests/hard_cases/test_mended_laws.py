@@ -27,6 +27,7 @@ SCENES = {
             "effects": {"rock": "power", "cuttings": True},
             "rock": {
                 "unloading_exponent": 12.0, "reference_penetration": 1e-4, "removed_share": 0.3,
+                "removed_by": "cycle",
             },
             "solver": {"name": "fem"},
         },
@@ -72,7 +73,7 @@ SCENES = {
             "bit": {"sections": [{"length": 0.2, "area": 0.0055}, {"length": 0.2, "area": 0.0055}]},
             "rock": {
                 "loading_stiffness": 6e8, "unloading_ratio": 800.0, "removed_share": 0.3,
-                "barrier_energy": 0.09,
+                "barrier_energy": 0.09, "removed_by": "cycle",
             },
             "start": {"piston_velocity": 6.0, "rock_gap": 9e-13},
             "solver": {"name": "fem"},
@@ -104,6 +105,7 @@ SCENES = {
             "feed": {"force": 400.0},
             "rock": {
                 "reference_penetration": 2e-3, "unloading_exponent": 0.15, "removed_share": 2e-5,
+                "removed_by": "cycle",
             },
             "start": {"piston_velocity": -0.02},
             "solver": {"cells": 5},

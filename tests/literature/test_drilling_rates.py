@@ -22,8 +22,9 @@ STIFFNESS, SPEED = "rock.loading_stiffness", "rotation.speed"
 HOUR, MEGA, RPM = 3600.0, 1e6, 2.0 * math.pi / 60.0
 # Feed of the least of makers' ranges by hammer [N].
 LEAST_FEED = {"dth3": 4400.0, "dth4": 6500.0, "dth5": 8300.0, "dth6": 9700.0}
-# Makers' feed on a 5 inch hammer with a bit of 140 mm [N].
-MAKERS_FEED = (9700.0, 12000.0, 15000.0, 20000.0)
+# Feed on the casing of a 5 inch hammer with a bit of 140 mm: that of the preset, and the greatest
+# of makers, who begin at 8.3 kN (docs/data/hammer_sources.md) [N].
+MAKERS_FEED = (11000.0, 13500.0)
 # A motor for it: torque at which it stalls, and up to which it holds its speed [N m].
 STALL, FULL = 900.0, 600.0
 
@@ -74,11 +75,12 @@ def recoil():
 @pytest.mark.parametrize("name", hammers())
 def test_five_percent_of_stiffness_move_the_rate_by_less(name, kind):
     """Those of the law before moved it by a fifth. Blows scatter, so each run has hundreds."""
-    stiffness, duration = scene_in(name, kind)[STIFFNESS], 12.0
-    middle = rate_of(name, kind, duration)
-    for factor in (0.95, 1.05):
-        moved = rate_of(name, kind, duration, **{STIFFNESS: factor * stiffness})
-        assert abs(moved / middle - 1.0) < 0.05, factor
+    stiffness, rates = scene_in(name, kind)[STIFFNESS], {}
+    for factor in (1.0, 0.95, 1.05):
+        blows = blows_of(name, kind, 12.0, ((STIFFNESS, factor * stiffness),))
+        rates[factor], scatter = rate_of_blows(blows)
+        assert scatter < 0.01 * rates[factor], factor
+        assert abs(rates[factor] / rates[1.0] - 1.0) < 0.05, factor
 
 
 @pytest.mark.parametrize("name", ["dth4", "dth5", "dth6"])
@@ -95,16 +97,14 @@ def test_hammers_in_granite_drill_at_usual_rates(name):
 def test_cycles_below_the_threshold_hardly_advance_the_hole(name):
     """By the law before, nine of ten cycles of a blow gave two fifths of its advance."""
     scene = scene_in(name, "kuru-granite").replace(**{"run.settle": 0.0})
-    first = Simulation(scene)
+    first, again, seen = Simulation(scene), Simulation(scene), []
     first.advance(1.5)
     tops = first.events["time"][first.events["kind"] == Mode.BC]
-    # a step after the top, as those of waves tell of it
-    seen = Simulation(scene).sample(np.unique(tops[tops > 0.5]) + 2e-6)
-    crushed, depth = seen["breaking_crushed"], seen["hole_depth"]
-    energy = np.diff(crushed)
-    energy = np.where(energy < -1e-6, crushed[1:], energy)  # at a new place it counts anew
-    advance = np.diff(depth)
-    small = energy < scene["breaking.buttons"] * scene["breaking.threshold"]
+    for top in np.unique(tops[tops > 0.5]):
+        again.advance(top + 2e-6)  # a step after the top, as those of waves tell of it
+        seen.append((again.energy()["crushing"], again.observe()["hole_depth"]))
+    crushed, advance = np.diff(seen, axis=0).T
+    small = crushed < scene["breaking.buttons"] * scene["breaking.threshold"]
     assert small.sum() > (~small).sum() > 10
     assert advance[small].sum() < 0.01 * advance.sum()
 

@@ -255,6 +255,7 @@ def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
     # without a barrier nothing damps a bit on its old line, and modes list each of its turns
     rings = scene.solver_name == "modal" and not scene.barrier_on
     changes["rotation.old_line"] = not (scene.effects.cuttings or rings) and chance(source, 40)
+    changes["rock.removed_by"] = source.pick(("blow", "cycle"))
     return scene.replace(**changes)
 
 

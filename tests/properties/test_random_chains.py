@@ -134,6 +134,7 @@ def draw_scene(source: Source) -> Scene:
         groups["rock"] |= {
             "removed_share": source.between(0.0, 1.0),
             "removal_exponent": source.pick((1.0, source.between(0.0, 4.0))),
+            "removed_by": source.pick(("blow", "cycle")),
         }
     if chance(source, 50):
         groups["solver"] = {"cells": round(source.between(2.0, 40.0))}
