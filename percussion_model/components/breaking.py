@@ -96,8 +96,9 @@ def next_blow(par, s, period, kept, rest, push, climb):
         0.0,
         s.breaking_under_way,
     )
-    # rock that is left as it was is crushed from there on, other rock from nothing
-    s.breaking_crushed = taken if par.left == 1 else 0.0
+    # rock that is left as it was is crushed from there on; a loading under way goes on
+    under_way = min(s.crushed_before, s.breaking_crushed)
+    s.breaking_crushed = taken if par.left == 1 else under_way
 
 
 COMPONENT = Component(

@@ -325,6 +325,7 @@ def end_loading(par, s):
             s.b_counting = margin
     if par.places == 1:
         leave_pit(par, s)
+        s.crushed_before = 0.0
     if par.power == 1:
         force = loading_force(par, s, s.p)
         given_back = recovery(par, s, s.p, force)

@@ -144,9 +144,10 @@ class Rig:
     pit: float = 0.0
     hole: float = 0.0
     taken: float = 0.0
-    crushed: float = 0.0  # by the greatest loading at this place
+    crushed: float = 0.0  # at this place
     cycle: tuple[float, float] = (0.0, 0.0)  # surface and peak where this cycle began
-    parted: float = 0.0  # crushed by the loading under way before it came to this place
+    began: float = 0.0  # penetration at which this cycle began
+    parted: bool = False  # the loading under way began at another place
     volume: float = 0.0
     turning: float = 0.0
     torque: float = 0.0
@@ -391,7 +392,7 @@ class Rig:
         self.mode, self.peak = "loading", peak
         self.surface = self.x - peak / self.law.ratio
         self.damped, self.spent = self.law.barrier is not None, 0.0
-        self.cycle, self.parted = (self.surface, peak), 0.0
+        self.cycle, self.parted, self.began = (self.surface, peak), False, peak
 
     def kink(self) -> None:
         self.begin(self.peak)
@@ -417,29 +418,30 @@ class Rig:
     def book(self) -> None:
         """Note what the loading has broken."""
         energy, volume, gained = self.gained()
-        self.crushed = max(self.crushed, energy)
+        self.crushed += energy
         self.under_way += volume
         self.volume += gained * self.law.area
         self.hole += gained
         self.pit += self.surface - self.cycle[0] - gained
 
     def gained(self) -> tuple[float, float, float]:
-        """Energy that the loading tells of so far, its volume and its advance.
+        """Energy that the loading adds at this place so far, its volume and its advance.
 
-        Fresh rock has taken what leads to this peak, however the bit came there; on the old line
-        it is crushed from where it was left.
+        On the old line it is crushed from where it was left. Fresh rock that was loaded before
+        takes the energy of reloading it first, from the force of the start on.
         """
         one, (surface, before) = self.law, self.cycle
         share = 0.5 * one.stiffness * (1.0 - 1.0 / one.ratio)
-        if one.old_line:
-            energy = self.crushed + share * (self.peak**2 - before**2)
-        else:
-            energy = share * self.peak**2
+        energy = share * (self.peak**2 - before**2)
+        if not (one.old_line or self.parted):
+            reloads = max(self.crushed - share * before**2, 0.0) / one.ratio
+            energy = max(energy - reloads, 0.0)
         deeper = self.surface - surface
         if one.energy == 0.0:
             return energy, 0.0, deeper
-        known = max(one.buttons * one.threshold, self.taken, self.crushed, self.parted)
-        volume = one.efficiency * max(energy - known, 0.0) / one.energy
+        known = max(one.buttons * one.threshold, self.taken)
+        beyond = max(self.crushed + energy - known, 0.0) - max(self.crushed - known, 0.0)
+        volume = one.efficiency * beyond / one.energy
         return energy, volume, min(volume / one.area, deeper)
 
     # blows
@@ -470,10 +472,12 @@ class Rig:
         feed = self.feed
         if one.casing is not None:
             self.recoil = push / self.throttled
+        carried = 0.0
         if self.mode == "loading":  # it goes on at the next place
-            energy = self.gained()[0]
+            share = 0.5 * one.stiffness * (1.0 - 1.0 / one.ratio)
             self.book()
-            self.cycle, self.parted = (self.surface, self.cycle[1]), energy
+            carried = min(share * (self.peak**2 - self.began**2), self.crushed)
+            self.cycle, self.parted = (self.surface, self.peak), True
         arc = one.radius * self.turning * period
         kept = math.exp(-0.5 * arc / one.renewal)  # of depth; of energy the square
         if one.old_line and self.peak > 0.0:
@@ -491,7 +495,7 @@ class Rig:
         self.turning += follows * (speed - self.turning)
         self.pit = self.pit - climb if one.old_line else 0.0
         self.taken = kept**2 * max(self.taken, self.crushed)
-        self.crushed = self.taken if one.old_line else 0.0
+        self.crushed = self.taken if one.old_line else carried
         self.last, self.under_way = self.under_way, 0.0
 
     def run(self, blows: int) -> list[dict[str, float]]:

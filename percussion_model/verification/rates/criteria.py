@@ -19,9 +19,9 @@ of their buttons. A closed form with other numbers had been tried on 16 cases th
 
 Changed after the first comparison, against the model: where no blow breaks anything the rate is 0.
 Changed in the model after it, for reasons that are not these rates: the threshold is by the cube of
-the button's diameter (5 J before), as craters under similar buttons are similar; a loading of a
-place breaks what it crushes beyond the greatest before, where energies were added up, as a loading
-cut in two has to break what one does. Before, all cases had missed all four, and 18 top hammers met
+the button's diameter (5 J before), as craters under similar buttons are similar; a further
+loading of a place first reloads the rock, where energies were added up before, as a loading cut in
+two has to break what one does. Before, all cases had missed all four, and 18 top hammers met
 the mean (1.19), the scatter (1.47) and the factor 2 (83 %).
 """
 
