@@ -8,7 +8,6 @@ from typing import Any, Literal, NamedTuple
 
 from fmu_src.hammer.inputs import DRIVE_INPUTS, PLAIN_INPUTS
 from fmu_src.hammer.motion import AT, Motion
-from fmu_src.units import fmi_unit
 from percussion_model.components import COMPONENTS
 from percussion_model.physics.records import Mode
 
@@ -123,7 +122,7 @@ for _one in COMPONENTS:
         _one.state.items(), _one.fields, strict=True
     ):
         OUTPUTS[f"{_one.name}.{_name}"] = Output(
-            fmi_unit(_unit),
+            _unit,
             -_ENERGY,
             _ENERGY,
             1.0,

@@ -46,10 +46,21 @@ def uncertain_numbers(scene: Scene) -> tuple[str, list[Number]]:
     name = rock_of(scene)
     if not name:
         return "", []
-    numbers = [*numbers_under(read_rock(name), scene), EFFICIENCY]
+    numbers = [*numbers_under(read_rock(name), scene), _about(EFFICIENCY, scene)]
     if (own := bit_of(scene)) and scene["effects.rotation"]:
         numbers.append(replace(bit(own).mean_radius, key=RADIUS))
     return name, [one for one in numbers if one.low < one.high and scene.matters(one.key)]
+
+
+def _about(number: Number, scene: Scene) -> Number:
+    """A number of the bit about the value that a scene has, with an interval as wide."""
+    share = scene[number.key] / number.value
+    return replace(
+        number,
+        value=share * number.value,
+        low=share * number.low,
+        high=min(share * number.high, 1.0),
+    )
 
 
 def rate_interval(
@@ -97,9 +108,12 @@ def _shares(samples: int, numbers: int) -> list[list[float]]:
 
 def _within(one: Number, share: float) -> float:
     """Value of a number: half of all below its own, evenly by the logarithm on both sides."""
-    if share < 0.5:
-        return float(one.low * (one.value / one.low) ** (2.0 * share))
-    return float(one.value * (one.high / one.value) ** (2.0 * share - 1.0))
+    low, high, part = one.low, one.value, 2.0 * share
+    if share >= 0.5:
+        low, high, part = one.value, one.high, 2.0 * share - 1.0
+    if low <= 0.0:  # of which there is no logarithm
+        return float(low + part * (high - low))
+    return float(low * (high / low) ** part)
 
 
 def _rate(scene: Scene) -> float:

@@ -35,6 +35,9 @@ MOST_BLOWS = 400
 MOST_TIME, CELL_STEPS = 300.0, 1e7
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
+# A motor of the rotation has its speed, to 1e-4, after so many times of its response; blows look
+# alike long before.
+MOTOR_SETTLES = 10.0
 # Two changes that fall alike take so many blows: looking earlier is in vain.
 FEWEST_BLOWS = 4
 # Many blows are looked at again when there is one more for so many.
@@ -338,6 +341,7 @@ def settled(
     began = time.thread_time()
     simulation = Simulation(scene, record_events=False)
     blows, next_check = simulation.blows, float(FEWEST_SCATTERED)
+    slowest = MOTOR_SETTLES * _motor_response(scene)
 
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
@@ -372,14 +376,21 @@ def settled(
             return made("stalled", 0, math.nan, math.nan, math.nan)
         if progress is not None:
             progress(len(blows))
-        for order, found in cycles_in(blows, tolerance).items():
-            return made("periodic", order, *found)
+        if simulation.time >= slowest:
+            for order, found in cycles_in(blows, tolerance).items():
+                return made("periodic", order, *found)
         if scatter and len(blows) >= next_check:
             next_check = NEXT_CHECK * len(blows)
             rate, error = rate_of_blows(after_settling(blows))
             if error <= scatter * abs(rate):
                 break
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
+
+
+def _motor_response(scene: Scene) -> float:
+    """Time in which the rotation follows its torque, 0 where its speed is given [s]."""
+    follows = scene["effects.rotation"] and scene["rotation.stall_torque"] > 0.0
+    return float(scene["rotation.response"]) if follows else 0.0
 
 
 def _other_motions(

@@ -127,7 +127,7 @@ def show_summary(result: Result) -> None:
 def show_interval(result: Result, found: RateInterval | None) -> None:
     """Print what the intervals of rock and bit leave of a rate, beside its numerical error."""
     summary = result.summary()
-    if found is None or not summary[RATE[1]]:
+    if found is None or not summary[RATE[1]] or summary["rate_of_penetration_undecided"]:
         return
     one = DRILLER_NUMBERS[RATE[1]]
     low, high = (

@@ -119,8 +119,8 @@ TEXTS = {
         "it, or a bit (--bit), or set effects.rotation = false"
     ),
     Rule.ROTATION_AND_CUTTINGS: (
-        "rotation.old_line and effects.cuttings both say what is left of craters: set one of "
-        "them to false"
+        "effects.rotation and effects.cuttings both say what is left of craters: set one of them "
+        "to false, or rotation.renewal_length = 0"
     ),
     Rule.CASING_AND_DAMPER: (
         'feed.on = "casing" and effects.damper = true both have a casing: set feed.on = "bit", '
@@ -223,7 +223,7 @@ def _in_breaking(v: Any) -> Rule:
     if v.effects_rotation:
         if not v.rotation_mean_radius > 0.0:
             return Rule.ROTATION_WITHOUT_RADIUS
-        if v.effects_cuttings and v.rotation_old_line:
+        if v.effects_cuttings and v.rotation_renewal_length > 0.0:
             return Rule.ROTATION_AND_CUTTINGS
         if v.rotation_stall_torque > 0.0 and v.rotation_full_torque > v.rotation_stall_torque:
             return Rule.MOTOR

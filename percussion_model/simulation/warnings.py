@@ -32,6 +32,8 @@ from percussion_model.simulation.validity import (
 
 # A larger error of the wave speed shows in the answers.
 MOST_WAVE_SPEED_ERROR = 1e-3
+# A rotation that is slower does not turn [rad/s].
+STANDING = 1e-2
 # Entries of the ledger that put energy in.
 _FLOWS = ("initial", "drive", "feed", "gravity")
 
@@ -137,12 +139,20 @@ def _about_blows(result: Result) -> Iterator[str]:
         )
     yield from _about_flight(result)
     rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
-    if rate > 0.0 and scatter > LARGE_ERROR * rate:
+    if _stands(result):
+        yield "the bit does not turn: it meets its own craters, and the hole does not advance"
+    elif rate > 0.0 and scatter > LARGE_ERROR * rate:
         yield (
             f"blows do not repeat: the rate of penetration has a standard error of "
             f"{in_digits(100.0 * scatter / rate, 2)} %; a longer run.duration (--duration) "
             "averages more"
         )
+
+
+def _stands(result: Result) -> bool:
+    """Whether a bit that should turn stands still at the end."""
+    turns = result.scene["effects.rotation"] and result.scene["effects.breaking"]
+    return bool(turns and result.end and abs(result.end["rotation_turning_speed"]) < STANDING)
 
 
 def _about_flight(result: Result) -> Iterator[str]:

@@ -24,8 +24,13 @@ FITTED = (
     "breaking.crushing_energy", "breaking.threshold", "rotation.renewal_length",
     "rotation.friction",
 )  # fmt: skip
-# What may be measured, by key of a summary: unit, and error as a share where none is given.
-MEASURED = {"rate_of_penetration": ("m/s", 0.03), "rotation_torque": ("N m", 0.1)}
+# What may be measured, by key of a summary: unit, error as a share, and more than any drill has.
+MEASURED = {
+    "rate_of_penetration": ("m/s", 0.03, 0.5),
+    "rotation_torque": ("N m", 0.1, 1e6),
+}
+# Errors that a number may be off by, and be explained.
+EXPLAINED = 3.0
 # Without an interval a parameter is known within a factor e.
 UNKNOWN = 1.0
 # Standard deviations from low to high of an interval that holds nine tenths.
@@ -35,6 +40,8 @@ TOLD = 0.5
 DURATION, SETTLE = 6.0, 1.0  # of a run [s]
 STEP, MOST_STEPS, SETTLED = 0.03, 8, 0.003  # in logarithms
 LONGEST_MOVE = 0.7
+# More than a button of any bit breaks [m^3].
+MOST_CRATER = 1e-3
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,14 @@ class SiteFit:
 
     estimates: tuple[SiteEstimate, ...]
     rows: tuple[tuple[str, float, float], ...]
+
+    def unexplained(self) -> list[str]:
+        """Names of the measured numbers that the model misses by more than their error."""
+        return [
+            name
+            for name, measured, model in self.rows
+            if abs(math.log(model / measured)) > EXPLAINED * MEASURED[name.split()[0]][1]
+        ]
 
     def changes(self) -> dict[str, float]:
         """Values of the parameters that the data tell."""
@@ -90,6 +105,8 @@ def fit_site(
     if not (scene["effects.breaking"] and scene["effects.rotation"]):
         raise FitError("a fit to a site needs effects.breaking and effects.rotation: give --bit")
     names = [name for name in MEASURED if name in columns]
+    for name in names:
+        _refuse_impossible(name, columns[name])
     data = [
         (name, k, math.log(value))
         for name in names
@@ -129,6 +146,17 @@ def fit_site(
         for (name, k, value), found in zip(data, last.tolist(), strict=True)
     )
     return SiteFit(estimates, rows)
+
+
+def _refuse_impossible(name: str, values: Sequence[float]) -> None:
+    """Raise `FitError` for numbers that no drill has."""
+    unit, _, most = MEASURED[name]
+    for row, value in enumerate(values, 1):
+        if not 0.0 < value <= most:
+            raise FitError(
+                f"{name} = {value:g} {unit} in row {row} of numbers: must be above 0 and at most "
+                f"{most:g} {unit}; a heading may carry another unit, as rate_of_penetration [m/h]"
+            )
 
 
 def _summary(scene: Scene, setting: Mapping[str, float]) -> dict[str, float]:
@@ -210,6 +238,12 @@ def fit_craters(energy: Sequence[float], volume: Sequence[float]) -> tuple[float
         If there are fewer, or the volumes do not grow.
     """
     x, y = np.asarray(volume, float), np.asarray(energy, float)
+    if not (np.all(x >= 0.0) and np.all(y > 0.0) and np.all(x < MOST_CRATER)):
+        raise FitError(
+            f"craters of {x.min():g} to {x.max():g} m^3 at {y.min():g} to {y.max():g} J: volumes "
+            f"must be from 0 to {MOST_CRATER:g} m^3 and energies above 0 J; a heading may carry "
+            "another unit, as volume [cm^3]"
+        )
     if len(np.unique(x)) < 3 or len(x) != len(y):
         raise FitError(f"{len(x)} craters: at least three of different volume are wanted")
     ones = np.stack([x, np.ones_like(x)], axis=1)

@@ -44,6 +44,8 @@ FOUND = {
     "peak_contact_force": "N",
     "contacts_per_blow": "-",
     "drilling_cycles_per_blow": "-",
+    "rotation_torque": "N m",
+    "breaking_blow_volume": "m^3",
 }
 ROW = np.dtype(
     [

@@ -58,8 +58,8 @@ def calibrate(
         typer.Option(
             "--crater",
             metavar="CSV",
-            help="Craters of one button: energy crushed [J], volume [cm^3]. Fits crushing energy "
-            "and threshold.",
+            help="Craters of one button: energy [J] that was crushed, volume [cm^3]. Fits crushing "
+            "energy and threshold.",
         ),
     ] = None,
     gauge: Annotated[
@@ -123,6 +123,8 @@ def calibrate(
         if path is not None:
             common.refuse_existing(path, force)
     chosen = common.load_scene(scene, solver, cells, settings, rock=rock, bit=bit)
+    if (site is not None or crater is not None) and (only or ranges):
+        raise common.refusal("--only and --range are of a fit to --curve, --drop or --measured")
     if site is not None or crater is not None:
         from percussion_model.interface.commands.calibrate_site import calibrate_breaking
 

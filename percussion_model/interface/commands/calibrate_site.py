@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from percussion_model.analysis.fitting.site import SiteFit
     from percussion_model.scene.scene import Scene
 
-TOLD, NOT_TOLD = "told by the data", "not told: as before"
+TOLD, NOT_TOLD = "determined", "not determined, kept"
 
 
 def calibrate_breaking(
@@ -53,6 +53,10 @@ def calibrate_breaking(
     common.write_json(json_file, told)
     if json_file != "-":
         _show(rows)
+    if site is not None and (missed := found.unexplained()):
+        common.print_message(
+            f"not explained, more than three errors off: {', '.join(missed)}; trust no number of it"
+        )
     if out is not None:
         text = scene.replace(**changes).to_toml()
         head = (
@@ -75,6 +79,7 @@ def _craters(path: Path) -> dict[str, list[float]]:
 
 def _settings(scene: Scene, path: Path) -> dict[str, list[float]]:
     """Columns of a file: numbers of the scene that matter, and what was measured."""
+    from percussion_model.analysis.fitting import FitError
     from percussion_model.analysis.fitting.site import MEASURED
     from percussion_model.interface.csv_tables import UNITS, read_columns
     from percussion_model.scene.parameters import parameter_table
@@ -84,8 +89,13 @@ def _settings(scene: Scene, path: Path) -> dict[str, list[float]]:
         for row in parameter_table()
         if row.unit in UNITS and "*" not in row.key and scene.matters(row.key)
     }
-    known |= {name: unit for name, (unit, _) in MEASURED.items()}
+    known |= {name: unit for name, (unit, *_) in MEASURED.items()}
     columns, others = read_columns(path, known, f"{' or '.join(MEASURED)} is wanted")
+    if meant := [one for one in others if "." in one]:
+        raise FitError(
+            f"{path}: {meant[0]} is no parameter that matters in this scene, nor "
+            f"{' or '.join(MEASURED)}: leave it out, or correct its name"
+        )
     if others:
         common.print_message(f"{path}: not read: {', '.join(others)}")
     return {key: values.tolist() for key, values in columns.items()}
@@ -104,14 +114,12 @@ def _estimates(found: SiteFit) -> list[tuple[str, str, str]]:
 
 
 def _comparison(found: SiteFit) -> list[tuple[str, str, str]]:
-    return [
-        (
-            name,
-            f"measured {measured:.4g}, model {model:.4g}",
-            f"{100 * (model / measured - 1):+.1f} %",
-        )
-        for name, measured, model in found.rows
-    ]
+    rows = []
+    for name, measured, model in found.rows:
+        factor, unit = (3600.0, "m/h") if name.startswith("rate") else (1.0, "N m")
+        text = f"measured {factor * measured:.4g}, model {factor * model:.4g}"
+        rows.append((f"{name}, {unit}", text, f"{100 * (model / measured - 1):+.1f} %"))
+    return rows
 
 
 def _show(rows: list[tuple[str, str, str]]) -> None:

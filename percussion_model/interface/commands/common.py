@@ -164,9 +164,11 @@ def load_scene(
     from percussion_model.scene.text import read_setting
 
     scene = Scene() if path is None else Scene.from_toml(path)
-    scene = with_bit(scene, bit)
-    changes: dict[str, Any] = rock_changes(rock, scene)
-    changes |= dict(read_setting(text) for text in settings or ())
+    scene, given = with_bit(scene, bit), dict(read_setting(text) for text in settings or ())
+    # the rock is taken for the bit that is set
+    of_bit = {key: value for key, value in given.items() if key.startswith(OF_BIT)}
+    changes: dict[str, Any] = rock_changes(rock, scene.replace(**of_bit) if rock else scene)
+    changes |= given
     if solver is not None:
         scene = scene.computed_by(solver, **changes)
     elif changes:
@@ -180,6 +182,10 @@ def load_scene(
     if is_run:
         tell_of_compiling(scene.solver_name)
     return scene
+
+
+# Keys of what a bit has.
+OF_BIT = ("effects.breaking", "effects.rotation", "hole_diameter", "breaking.", "rotation.")
 
 
 def with_bit(scene: Scene, name: str | None) -> Scene:

@@ -79,7 +79,7 @@ def run(
             with progress("drawing") as report:
                 files += _draw(result, claimed.folder, report)
             common.sign(claimed)
-    by_rock = None if result.cut_short else _by_rock(chosen, rock_interval)
+    by_rock = None if result.cut_short else _by_rock(chosen, rock_interval, rock)
     if json_file != "-":
         terminal.show_summary(result)
         terminal.show_interval(result, by_rock)
@@ -93,12 +93,19 @@ def run(
         raise typer.Exit(common.INTERRUPTED)
 
 
-def _by_rock(scene: Scene, is_wanted: bool) -> RateInterval | None:
+def _by_rock(scene: Scene, is_wanted: bool, asked: str | None) -> RateInterval | None:
     """What the intervals of rock and bit leave of the rate, where they are known."""
     from percussion_model.analysis.rock_interval import rate_interval, uncertain_numbers
     from percussion_model.interface.progress import progress
 
-    if not (is_wanted and scene["effects.breaking"] and uncertain_numbers(scene)[1]):
+    if not (is_wanted and scene["effects.breaking"]):
+        return None
+    if not uncertain_numbers(scene)[1]:
+        if asked:
+            common.print_message(
+                "rock and bit leave the rate uncertain, by how much is not known: the scene has "
+                "other numbers than the rock"
+            )
         return None
     text = "sampling the intervals of rock and bit"
     with progress(text) as report:
