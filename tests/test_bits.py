@@ -241,7 +241,7 @@ CONTRADICTIONS = {
     "no radius": ({"effects.rotation": True}, "effects.rotation = true needs rotation.mean_radius"),
     "cuttings": (
         {"effects.rotation": True, "rotation.old_line": True, "effects.cuttings": True, **WHOLE},
-        "rotation.old_line and effects.cuttings both say",
+        "effects.rotation and effects.cuttings both say",
     ),
     "motor": (
         {

@@ -138,7 +138,8 @@ def test_all_cases_have_one_set_of_numbers():
     assert energy.low == pytest.approx(ENERGY_SHARES[0] * energy_by_strength(strength.low))
     assert energy.high == pytest.approx(ENERGY_SHARES[1] * energy_by_strength(strength.high))
     threshold = numbers["breaking.threshold"]
-    assert (threshold.low, threshold.high) == THRESHOLDS
+    shares = (threshold.low / threshold.value, threshold.high / threshold.value)
+    assert shares == THRESHOLDS
     assert numbers["rotation.renewal_length"].value == RENEWAL
     assert numbers["rotation.friction"].value == FRICTION
     ratio = plain.number("rock.unloading_ratio")

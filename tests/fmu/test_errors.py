@@ -77,7 +77,7 @@ TURNS = {"effects.rotation": True, "rotation.mean_radius": 0.03}
         ({"effects.rotation": True}, "needs rotation.mean_radius"),
         (
             {**TURNS, "rotation.old_line": True, "effects.cuttings": True},
-            "rotation.old_line and effects.cuttings both say",
+            "effects.rotation and effects.cuttings both say",
         ),
         (
             {**TURNS, "rotation.full_torque": 500.0, "rotation.stall_torque": 400.0},

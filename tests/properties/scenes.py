@@ -254,6 +254,8 @@ def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
     changes |= {key: crushed and chance(source, 50) for key in SWITCHES}
     # without a barrier nothing damps a bit on its old line, and modes list each of its turns
     rings = scene.solver_name == "modal" and not scene.barrier_on
+    if scene.effects.cuttings and changes.get("effects.rotation"):  # both say what is left
+        changes["rotation.renewal_length"] = 0.0
     changes["rotation.old_line"] = not (scene.effects.cuttings or rings) and chance(source, 40)
     changes["rock.removed_by"] = source.pick(("blow", "cycle"))
     return scene.replace(**changes)

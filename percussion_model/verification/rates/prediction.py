@@ -36,7 +36,7 @@ from percussion_model.verification.rates.cases import DOWN, TOP, Case
 RATIO = (5.0, 2.5, 15.0)
 # Intervals of crushing energy and of the threshold, by their values, as for those rocks.
 ENERGY_SHARES, THRESHOLDS = (46.0 / 55.0, 65.0 / 55.0), (0.4, 2.0)
-RENEWAL, FRICTION = 2e-3, 0.4
+RENEWAL, FRICTION = 2e-3, 0.8
 # The ready-made hammer that a top hammer's bars and damper are of: bits to this diameter [m] have
 # T38 rods, wider ones T45.
 WIDEST_T38, T38, T45, RODS = 0.08, "t38", "t45", 1
