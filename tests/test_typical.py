@@ -112,5 +112,5 @@ def test_a_study_hints_once_for_an_axis(percussion, tmp_path):
 
 
 def test_bounds_are_still_bounds():
-    with pytest.raises(SceneError, match="must be a number from 0.001 to 10 m"):
+    with pytest.raises(SceneError, match=r"must be a number from 0\.001 to 10 m"):
         Scene(hole_diameter=165)
