@@ -11,6 +11,7 @@ import pytest
 from percussion_model import simulate
 from percussion_model.analysis.fitting import FitError
 from percussion_model.analysis.fitting.site import fit_craters, fit_site
+from percussion_model.analysis.stationary import settled
 from percussion_model.scene.hammers import hammer
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import parameters_under
@@ -95,3 +96,21 @@ def test_what_cannot_be_fitted_is_said(tmp_path, monkeypatch, capsys):
     assert "give --bit" in capsys.readouterr().err
     assert percussion("calibrate", "reference") == 2
     assert "nothing to fit" in capsys.readouterr().err
+
+
+def test_a_motor_has_followed_its_torque_where_blows_repeat():
+    """Blows look alike long before the rotation is as slow as its torque makes it."""
+    slow = {"feed.force": 12e3, "rotation.stall_torque": 350.0, "rotation.full_torque": 100.0}
+    weak = scene().replace(**slow)
+    run = simulate(weak, 6.0, 3.0, error_estimate=False).rate_of_penetration
+    assert settled(weak).rate_of_penetration == pytest.approx(run, rel=0.02)
+    free = simulate(scene(), 6.0, 3.0, error_estimate=False).rate_of_penetration
+    assert run < 0.95 * free
+
+
+def test_impossible_numbers_of_a_site_are_refused():
+    for name, value in (("rate_of_penetration", -0.01), ("rate_of_penetration", 30.0)):
+        with pytest.raises(FitError, match=rf"{name} = .* must be above 0"):
+            fit_site(scene(), {name: [value]})
+    with pytest.raises(FitError, match=r"volume \[cm\^3\]"):
+        fit_craters([10.0, 20.0, 30.0], [0.1, 0.2, 0.3])
