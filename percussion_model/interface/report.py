@@ -182,7 +182,10 @@ def why_not_interactive() -> str:
 
 
 def write_report(
-    result: Result, folder: str | Path, figure_files: Iterable[Path] | None = None
+    result: Result,
+    folder: str | Path,
+    figure_files: Iterable[Path] | None = None,
+    rock_interval: str = "",
 ) -> Path:
     """Write `report.html`, which needs no other file and no network.
 
@@ -196,6 +199,8 @@ def write_report(
     figure_files : iterable of Path, optional
         What `figures` returned for this result; if left out, the figures are
         drawn into the folder as well.
+    rock_interval : str
+        What the intervals of rock and bit leave of the rate, as a sentence.
 
     Returns
     -------
@@ -205,11 +210,12 @@ def write_report(
     folder = Path(folder)
     if figure_files is None:
         figure_files = figures(result, folder)
-    page = render_report(result, [path for path in figure_files if path.suffix == ".svg"])
+    drawings = [path for path in figure_files if path.suffix == ".svg"]
+    page = render_report(result, drawings, rock_interval)
     return _write_page(folder, page)
 
 
-def render_report(result: Result, drawings: Sequence[Path]) -> str:
+def render_report(result: Result, drawings: Sequence[Path], rock_interval: str = "") -> str:
     """Return the page as text.
 
     Parameters
@@ -217,6 +223,7 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
     result : Result
     drawings : sequence of Path
         SVG files, for figures that cannot be zoomed.
+    rock_interval : str
     """
     blocks = {path.stem: _inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
     remark, scripts, blow = why_not_interactive(), "", last_blow(result)
@@ -240,6 +247,7 @@ def render_report(result: Result, drawings: Sequence[Path]) -> str:
         means=mean_cards(summary),
         headlines=headline_rows(summary),
         about_errors=about_errors(summary),
+        rock_interval=rock_interval,
         stress=stress_note(result, blow),
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],

@@ -33,7 +33,6 @@ from percussion_model.simulation.uncertain import (
 if TYPE_CHECKING:
     from percussion_model.analysis.comparison import Comparison
     from percussion_model.analysis.cost import Forecast
-    from percussion_model.analysis.rock_interval import RateInterval
     from percussion_model.analysis.stationary import Settled
     from percussion_model.analysis.study import Study
     from percussion_model.scene.scene import Scene
@@ -122,25 +121,6 @@ def show_summary(result: Result) -> None:
         note = f" {ABOUT_NUMBER}." if unknown else ""
         print_notes([about_errors(summary) + note])
     show_warnings(result.warnings)
-
-
-def show_interval(result: Result, found: RateInterval | None) -> None:
-    """Print what the intervals of rock and bit leave of a rate, beside its numerical error."""
-    summary = result.summary()
-    if found is None or not summary[RATE[1]] or summary["rate_of_penetration_undecided"]:
-        return
-    one = DRILLER_NUMBERS[RATE[1]]
-    low, high = (
-        in_digits(one.factor * summary[RATE[1]] * end, 2) for end in (found.low, found.high)
-    )
-    print_notes(
-        [
-            f"Rate: {driller_text(summary, RATE[1])} {one.unit} numerical; {low} to {high} "
-            f"{one.unit} by the intervals of {found.rock} and bit, which hold nine tenths of "
-            f"{found.samples} samples. Drills differ further: the model is no better than a "
-            "factor 2 without a calibration on site."
-        ]
-    )
 
 
 def _add_driller_row(table: Table, summary: Mapping[str, Any], key: str) -> None:

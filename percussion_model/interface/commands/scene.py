@@ -47,8 +47,10 @@ def run(
     ] = True,
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
+    from percussion_model.analysis.rock_interval import interval_text
     from percussion_model.interface import terminal
     from percussion_model.interface.progress import progress, progress_bar
+    from percussion_model.interface.tables import print_notes
     from percussion_model.simulation.simulate import simulate
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock, bit=bit)
@@ -75,14 +77,15 @@ def run(
             claimed = common.claim("run", None, out, force, **made_from)
         files += common.write_folder(claimed, result.save)
         files += common.sign(claimed)
-        if figures and not result.cut_short:
-            with progress("drawing") as report:
-                files += _draw(result, claimed.folder, report)
-            common.sign(claimed)
     by_rock = None if result.cut_short else _by_rock(chosen, rock_interval, rock)
+    told_by_rock = "" if by_rock is None else interval_text(by_rock, result.summary())
+    if claimed is not None and figures and not result.cut_short:
+        with progress("drawing") as report:
+            files += _draw(result, claimed.folder, report, told_by_rock)
+        common.sign(claimed)
     if json_file != "-":
         terminal.show_summary(result)
-        terminal.show_interval(result, by_rock)
+        print_notes([told_by_rock] if told_by_rock else [])
     if result.interrupted:
         told = (text for text in result.warnings if text.startswith("interrupted"))
         common.print_message(next(told, "interrupted before its error was known"))
@@ -271,7 +274,7 @@ def _made_from(scene: Scene, duration: float | None, settle: float | None) -> di
     }
 
 
-def _draw(result: Result, folder: Path, report: Report) -> list[Path]:
+def _draw(result: Result, folder: Path, report: Report, told_by_rock: str) -> list[Path]:
     """Write figures and report; the results are safe already."""
     files: list[Path] = []
     with common.if_drawable():
@@ -282,5 +285,5 @@ def _draw(result: Result, folder: Path, report: Report) -> list[Path]:
             common.print_message(remark)
         files += figures(result, folder, report)
         report("writing the report", None)
-        files.append(write_report(result, folder, files))
+        files.append(write_report(result, folder, files, told_by_rock))
     return files

@@ -122,13 +122,14 @@ def numbers_under(rock: Rock, scene: Scene) -> tuple[Number, ...]:
         return rock.numbers
     found = on_bottom(rock, rock.asked or scene["breaking.buttons"]).numbers
     kept = ("breaking.", "rotation.") if scene["effects.rotation"] else ("breaking.",)
-    own = (_under_buttons(one, scene) for one in breaking_numbers(rock))
+    is_own = rock.asked in (None, scene["breaking.buttons"])
+    name = bit_of(scene) if is_own else ""  # another number of buttons is another bit
+    own = (_under_buttons(one, name) for one in breaking_numbers(rock))
     return (*found, *(one for one in own if one.key.startswith(kept)))
 
 
-def _under_buttons(number: Number, scene: Scene) -> Number:
-    """A threshold under the buttons of a scene's bit, where that has a name."""
-    name = bit_of(scene)
+def _under_buttons(number: Number, name: str) -> Number:
+    """A threshold under the buttons of a bit, where that has a name."""
     if number.key != THRESHOLD or not name:
         return number
     share = bit(name).threshold_share
