@@ -87,7 +87,12 @@ class ButtonBit:
 
 def bits() -> list[str]:
     """Names of the bits that there are, by kind and size."""
-    return sorted((path.stem for path in _HERE.glob("*.toml")), key=_kind_and_size)
+    return list(_names())
+
+
+@cache
+def _names() -> tuple[str, ...]:
+    return tuple(sorted((path.stem for path in _HERE.glob("*.toml")), key=_kind_and_size))
 
 
 def _kind_and_size(name: str) -> tuple[str, int]:

@@ -130,7 +130,12 @@ class Rock:
 
 def rocks() -> list[str]:
     """Names of the rocks that there are."""
-    return sorted(path.stem for path in _HERE.glob("*.toml"))
+    return list(_names())
+
+
+@cache
+def _names() -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in _HERE.glob("*.toml")))
 
 
 def rock(name: str, buttons: int | None = None) -> Rock:
@@ -148,7 +153,7 @@ def rock(name: str, buttons: int | None = None) -> Rock:
     SceneError
         If there is no such rock, or it cannot be had for so many buttons.
     """
-    if name not in rocks():
+    if name not in _names():
         raise SceneError(
             f"rock {shortened(name)}: there is none of that name: {said_among(name, rocks())}"
         )
