@@ -77,13 +77,14 @@ def presets() -> str:
 
 
 def shares() -> str:
-    """Where the energy goes that drive, feed and weight put in."""
+    """Where the energy goes that was put in, without what friction takes of the rotation."""
     rows = []
     for rods in RODS:
         energy = run(SHOWN, rods).summary()["energy"]
         rock = energy["crushing"] + energy["barrier"] + energy["standstill"]
         taken = (rock, energy["loss"], energy["joints"], energy["numerical"])
-        rows.append([str(rods), *(f"{100 * part / energy['input']:.1f}" for part in taken)])
+        given = energy["input"] - energy["friction"]
+        rows.append([str(rods), *(f"{100 * part / given:.1f}" for part in taken)])
     head = ["rods", "rock, %", "structural loss, %", "damper, %", "numerical, %"]
     return table(head, rows, numbers=True)
 
