@@ -20,7 +20,7 @@ TICKS = (5, 10, 20, 50, 100, 200)
 # Where what drills nothing stands, and where its axis ends, below a gap [m/h].
 NOTHING, BOTTOM, GAP = 3.4, 2.8, 4.1
 # From the point to its name, in points.
-LEFT = (-7.0, -3.0)
+LEFT, RIGHT = (-7.0, -3.0), (7.0, -3.0)
 
 
 def draw_rates(found: Rates) -> Figure:
@@ -81,5 +81,6 @@ def _draw(ax: Axes, row: RateRow, look: tuple[str, str]) -> None:
     ax.plot([x], [y], marker, color=colour, markersize=6.5, markeredgecolor="black",
             markeredgewidth=0.5, zorder=5)  # fmt: skip
     if told.rate > 0.0 and not 1.0 / FACTOR <= row.ratio <= FACTOR:
-        ax.annotate(f"{row.case.rock}, {row.case.strength / 1e6:.0f} MPa", (x, y), LEFT,
-                    textcoords="offset points", ha="right", fontsize=8)  # fmt: skip
+        away, side = (LEFT, "right") if row.ratio > 1.0 else (RIGHT, "left")
+        ax.annotate(f"{row.case.rock}, {row.case.strength / 1e6:.0f} MPa", (x, y), away,
+                    textcoords="offset points", ha=side, fontsize=8)  # fmt: skip
