@@ -35,7 +35,7 @@ def measured(settings):
     """What a site with other rock gives at settings."""
     truth = scene().replace(**TRUTH)
     found = {"rate_of_penetration": [], "rotation_torque": []}
-    for k in range(len(next(iter(settings.values())))):
+    for k in range(len(next(iter(settings.values()), [0]))):
         run = truth.replace(**{key: values[k] for key, values in settings.items()})
         summary = simulate(run, 6.0, 1.0, error_estimate=False).summary()
         for name, values in found.items():
@@ -52,6 +52,19 @@ def test_rates_at_two_speeds_and_torques_find_the_rock_of_a_site():
         if one.key in TRUTH:  # within two standard errors, none of which is wide
             assert abs(math.log(one.value / TRUTH[one.key])) < 2.0 * math.log(one.factor)
             assert one.factor < 1.3
+    low, high = found.rate_interval()
+    assert low < measured({})["rate_of_penetration"][0] < high < 1.1 * low
+
+
+def test_a_fitted_scene_drills_as_the_fit_says():
+    """Also where the data leave some of its parameters open."""
+    data = measured({"rotation.speed": [54 * RPM]})
+    found = fit_site(scene(), data)
+    fitted = scene().replace(**found.changes())
+    rate = simulate(fitted, 6.0, 1.0, error_estimate=False).rate_of_penetration
+    assert found.rate == pytest.approx(rate, rel=1e-9)
+    # one rate known to 3 % leaves as much of the rate at the same setting
+    assert math.log(found.rate_factor) == pytest.approx(0.03, rel=0.1)
 
 
 def test_one_rate_tells_the_crushing_energy_and_no_renewal_length():
@@ -87,6 +100,20 @@ def test_the_command_fits_craters_and_writes_the_scene(tmp_path, monkeypatch, ca
     changes = json.loads(capsys.readouterr().out)["changes"]
     assert changes["breaking.crushing_energy"] == pytest.approx(6e7, rel=1e-6)
     assert "crushing_energy = 6" in (tmp_path / "fitted.toml").read_text(encoding="utf-8")
+
+
+def test_the_command_tells_what_a_site_leaves_of_the_rate(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "site.csv").write_text(
+        "rate_of_penetration [m/h],rotation.speed [rpm]\n33,54\n25,10\n", encoding="utf-8"
+    )
+    scene().to_toml(tmp_path / "drill.toml")
+    assert percussion("calibrate", "drill.toml", "--site", "site.csv", "--out", "one.toml") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "m/h by what the site leaves of its parameters" in told
+    written = (tmp_path / "one.toml").read_text(encoding="utf-8")
+    assert "# breaking.crushing_energy, J/m^3: " in written
+    assert "# rate_of_penetration 2, m/h: measured 25, model " in written
 
 
 def test_what_cannot_be_fitted_is_said(tmp_path, monkeypatch, capsys):

@@ -2,7 +2,7 @@
 
 Rates tell the crushing energy by the efficiency of the bit; rates at two speeds of rotation the
 renewal length; torques the friction; rates at two pressures the threshold. What the data do not
-tell stays with its prior, the interval of the rock.
+tell stays close to its prior, the interval of the rock.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ FITTED = (
     "rotation.friction",
 )  # fmt: skip
 # What may be measured, by key of a summary: unit, error as a share, and more than any drill has.
+RATE = "rate_of_penetration"
 MEASURED = {
-    "rate_of_penetration": ("m/s", 0.03, 0.5),
+    RATE: ("m/s", 0.03, 0.5),
     "rotation_torque": ("N m", 0.1, 1e6),
 }
 # Errors that a number may be off by, and be explained.
@@ -46,7 +47,7 @@ MOST_CRATER = 1e-3
 
 @dataclass(frozen=True)
 class SiteEstimate:
-    """A parameter: its value and error as a factor, those before, and whether the data tell it."""
+    """A parameter: its value and standard error as a factor, and those before."""
 
     key: str
     value: float
@@ -62,10 +63,28 @@ class SiteEstimate:
 
 @dataclass(frozen=True)
 class SiteFit:
-    """Estimates, and what scene and data give at each setting (`rows`: name, measured, model)."""
+    """What data tell of a scene.
+
+    Attributes
+    ----------
+    estimates : tuple of SiteEstimate
+    rows : tuple of (str, float, float)
+        Name, measured and of the model, at each setting.
+    rate : float
+        Of the scene with what was fitted [m/s].
+    rate_factor : float
+        Its standard error by that of the parameters, as a factor.
+    """
 
     estimates: tuple[SiteEstimate, ...]
     rows: tuple[tuple[str, float, float], ...]
+    rate: float
+    rate_factor: float
+
+    def rate_interval(self) -> tuple[float, float]:
+        """Rates between which that of the scene lies with nine tenths, by the parameters [m/s]."""
+        wide = self.rate_factor ** (WITHIN / 2.0)
+        return self.rate / wide, self.rate * wide
 
     def unexplained(self) -> list[str]:
         """Names of the measured numbers that the model misses by more than their error."""
@@ -76,8 +95,8 @@ class SiteFit:
         ]
 
     def changes(self) -> dict[str, float]:
-        """Values of the parameters that the data tell."""
-        return {one.key: one.value for one in self.estimates if one.is_told}
+        """Values of the parameters, which hold together."""
+        return {one.key: one.value for one in self.estimates}
 
 
 def fit_site(
@@ -121,16 +140,20 @@ def fit_site(
     ]
     count = 0
 
-    def model(place: np.ndarray) -> np.ndarray:
+    def run(place: np.ndarray, setting: Mapping[str, float]) -> dict[str, float]:
         nonlocal count
-        fitted = scene.replace(**dict(zip(FITTED, np.exp(place).tolist(), strict=True)))
-        found = []
-        for setting in settings:
-            found.append(_summary(fitted, setting))
-            count += 1
-            if progress is not None:
-                progress(count)
+        count += 1
+        if progress is not None:
+            progress(count)
+        fitted = dict(zip(FITTED, np.exp(place).tolist(), strict=True))
+        return _summary(scene.replace(**fitted), setting)
+
+    def model(place: np.ndarray) -> np.ndarray:
+        found = [run(place, setting) for setting in settings]
         return np.array([_log_of(found[k], name, settings[k]) for name, k, _ in data])
+
+    def own_rate(place: np.ndarray) -> np.ndarray:
+        return np.array([_log_of(run(place, {}), RATE, {})])
 
     center, spread = _prior(scene)
     measured = np.array([value for *_, value in data])
@@ -145,7 +168,10 @@ def fit_site(
         (f"{name} {k + 1}", math.exp(value), math.exp(found))
         for (name, k, value), found in zip(data, last.tolist(), strict=True)
     )
-    return SiteFit(estimates, rows)
+    log_rate = own_rate(place)
+    slope = _slopes(own_rate, place, log_rate)[0]
+    error = math.sqrt(slope @ covariance @ slope)
+    return SiteFit(estimates, rows, math.exp(log_rate[0]), math.exp(error))
 
 
 def _refuse_impossible(name: str, values: Sequence[float]) -> None:
@@ -201,11 +227,7 @@ def _best(
     place, prior = center.copy(), np.diag(1.0 / spread**2)
     here = model(place)
     for _ in range(MOST_STEPS):
-        slopes = np.empty((len(measured), len(place)))
-        for k in range(len(place)):
-            moved = place.copy()
-            moved[k] += STEP
-            slopes[:, k] = (model(moved) - here) / STEP
+        slopes = _slopes(model, place, here)
         weighted = slopes / sigma[:, np.newaxis] ** 2
         matrix = slopes.T @ weighted + prior
         pull = weighted.T @ (measured - here) - prior @ (place - center)
@@ -215,6 +237,14 @@ def _best(
         if np.max(np.abs(move)) < SETTLED:
             break
     return place, np.linalg.inv(matrix), here
+
+
+def _slopes(
+    model: Callable[[np.ndarray], np.ndarray], place: np.ndarray, here: np.ndarray
+) -> np.ndarray:
+    """How a model changes with each parameter; `here` is what it gives at the place."""
+    steps = STEP * np.eye(len(place))
+    return np.stack([(model(place + step) - here) / STEP for step in steps], axis=1)
 
 
 def fit_craters(energy: Sequence[float], volume: Sequence[float]) -> tuple[float, ...]:
