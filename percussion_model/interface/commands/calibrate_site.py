@@ -114,7 +114,7 @@ def _estimates(found: SiteFit) -> list[tuple[str, str, str]]:
     for one in found.estimates:
         row = find_row(one.key)
         unit = f", {row.unit}" if row and row.unit != "-" else ""
-        text = f"{one.value:.3g} ×/÷ {one.factor:.2f}"
+        text = f"{one.value:.3g}, factor {one.factor:.2f}"
         rows.append((f"{one.key}{unit}", text, TOLD if one.is_told else NOT_TOLD))
     return rows
 
@@ -123,7 +123,7 @@ def _about_rate(found: SiteFit) -> list[str]:
     """What the fit leaves of the rate, and what it does not hold for."""
     low, high = (f"{HOUR * end:.2g}" for end in found.rate_interval())
     return [
-        "×/÷ is the standard error, as a factor.",
+        "factor: one standard error, up or down.",
         f"Rate of the scene: {HOUR * found.rate:.3g} m/h; {low} to {high} m/h by what the site "
         "leaves of its parameters, with nine tenths. In other rock and for other drills it holds "
         "less: after one factor a site a third of the published rates were met within 30 % "
