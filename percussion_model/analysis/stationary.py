@@ -18,7 +18,7 @@ from percussion_model.simulation.error_estimate import FIRST_ORDER, with_error_e
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
-from percussion_model.simulation.result import Result
+from percussion_model.simulation.result import Result, end_of
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 from percussion_model.simulation.warnings import warnings_of_motion
@@ -35,8 +35,7 @@ MOST_BLOWS = 400
 MOST_TIME, CELL_STEPS = 300.0, 1e7
 # Longest cycle that is looked for [blows].
 MOST_BLOWS_A_CYCLE = 8
-# A motor of the rotation has its speed, to 1e-4, after so many times of its response; blows look
-# alike long before.
+# Blows look alike long before a motor has its speed, to 1e-4: after so many of its responses.
 MOTOR_SETTLES = 10.0
 # Two changes that fall alike take so many blows: looking earlier is in vain.
 FEWEST_BLOWS = 4
@@ -341,14 +340,12 @@ def settled(
     began = time.thread_time()
     simulation = Simulation(scene, record_events=False)
     blows, next_check = simulation.blows, float(FEWEST_SCATTERED)
-    slowest = MOTOR_SETTLES * _motor_response(scene)
+    slowest = MOTOR_SETTLES * scene["rotation.response"] if scene.motor_stalls else 0.0
 
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
         values = kind, order, rate, error, multiplier, cycle, blows, *times
-        found = Settled(
-            *values, depends_on_cells=scene.is_undamped, hole_diameter=scene.hole_diameter
-        )
+        found = Settled(*values, scene.is_undamped, hole_diameter=scene.hole_diameter)
         if not error_estimate:
             return found
         # before other runs make this one longer; a study of thousands would pay for them
@@ -362,11 +359,9 @@ def settled(
         return found
 
     while len(blows) < most_blows:
-        ended, patience = 0.0, STALLED_AFTER
+        ended, patience = end_of(blows), STALLED_AFTER
         if len(blows):
-            last = blows[-1]
-            ended = float(last["time"] + last["period"])
-            patience += STALLED_PERIODS * float(last["period"])
+            patience += STALLED_PERIODS * float(blows["period"][-1])
         before = len(blows)
         until = max(simulation.time, ended + patience)
         more = max(1, FEWEST_BLOWS - before, before // LOOK_AGAIN)
@@ -385,12 +380,6 @@ def settled(
             if error <= scatter * abs(rate):
                 break
     return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
-
-
-def _motor_response(scene: Scene) -> float:
-    """Time in which the rotation follows its torque, 0 where its speed is given [s]."""
-    follows = scene["effects.rotation"] and scene["rotation.stall_torque"] > 0.0
-    return float(scene["rotation.response"]) if follows else 0.0
 
 
 def _other_motions(

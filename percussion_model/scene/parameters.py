@@ -130,13 +130,7 @@ class Feed(Parameters):
     """Force from the surface on the bit or on the casing above it."""
 
     force: float = quantity(
-        2500.0,
-        "N",
-        "feed force F_S, down positive",
-        FEED_ON,
-        typical=FEED,
-        ge=-1e9,
-        le=1e9,
+        2500.0, "N", "feed force F_S, down positive", FEED_ON, FEED, ge=-1e9, le=1e9
     )
     on: str = choice(
         "bit",
@@ -165,12 +159,7 @@ class Drive(Parameters):
         le=100,
     )
     external_force: float = quantity(
-        0.0,
-        "N",
-        "force on the piston, down positive",
-        DRIVE_EXTERNAL,
-        ge=-1e9,
-        le=1e9,
+        0.0, "N", "force on the piston, down positive", DRIVE_EXTERNAL, ge=-1e9, le=1e9
     )
 
 

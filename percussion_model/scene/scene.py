@@ -365,6 +365,11 @@ class Scene:
         return self.effects.loss and self.has_waves and self.loss.time > 0
 
     @property
+    def motor_stalls(self) -> bool:
+        """Whether the bit is turned by a motor that slows by its torque, and may jam."""
+        return self["effects.rotation"] and self["rotation.stall_torque"] > 0.0
+
+    @property
     def is_undamped(self) -> bool:
         """Whether waves run without loss: then the rate of penetration depends on the cells."""
         return self.has_waves and not self.loss_on

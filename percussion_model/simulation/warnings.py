@@ -202,7 +202,7 @@ def _about_breaking(result: Result) -> Iterator[str]:
         return
     if scene["effects.breaking"]:
         yield from limit_note(end["breaking_limited"], end["breaking_volume"])
-    if scene["effects.rotation"] and scene["rotation.stall_torque"] > 0.0:
+    if scene.motor_stalls:
         yield from jam_note(end["rotation_needed_torque"], scene["rotation.stall_torque"])
     if scene.effects.feed and scene.feed.on == "casing":
         gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
