@@ -27,11 +27,7 @@ from percussion_model.verification.rates.criteria import (
     scatter,
 )
 from percussion_model.verification.rates.prediction import (
-    ENERGY_SHARES,
-    FRICTION,
     RATIO,
-    RENEWAL,
-    THRESHOLDS,
     Prediction,
     advance,
     first_scene,
@@ -133,21 +129,14 @@ def test_all_cases_have_one_set_of_numbers():
     """Those of a rock without own craters, so none is fitted to a rate."""
     plain = rock("red-bohus-granite")
     numbers = {one.key: one for one in breaking_numbers(plain)}
-    energy = numbers["breaking.crushing_energy"]
-    strength = plain.strength
-    assert energy.low == pytest.approx(ENERGY_SHARES[0] * energy_by_strength(strength.low))
-    assert energy.high == pytest.approx(ENERGY_SHARES[1] * energy_by_strength(strength.high))
-    threshold = numbers["breaking.threshold"]
-    shares = (threshold.low / threshold.value, threshold.high / threshold.value)
-    assert shares == THRESHOLDS
-    assert numbers["rotation.renewal_length"].value == RENEWAL
-    assert numbers["rotation.friction"].value == FRICTION
     ratio = plain.number("rock.unloading_ratio")
     assert (ratio.value, ratio.low, ratio.high) == RATIO
     for one in stored_cases().cases:
         found = rock_parameters(one)
         assert found["breaking.crushing_energy"] == energy_by_strength(one.strength)
         assert found["breaking.efficiency"] == 0.64
+        for key in ("rotation.renewal_length", "rotation.friction"):
+            assert found[key] == numbers[key].value
         assert found["hole_diameter"] == one.bit
 
 

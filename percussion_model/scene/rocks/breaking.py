@@ -33,6 +33,8 @@ SAME = 1e-9
 _OFFSET = 149e6
 # Crushing energy of single craters in two rocks [J/m^3], and the mean of their strengths [Pa].
 _MEASURED, _LOW, _HIGH, _AT = 55e6, 46e6, 65e6, 164e6
+# Interval of a crushing energy that follows from the strength, by its value.
+ENERGY_SHARES = _LOW / _MEASURED, _HIGH / _MEASURED
 # Where no strength is known.
 _WIDE = (30e6, 90e6)
 # A bit on the bottom that it has drilled touches with some of its buttons: stiffness by that of
@@ -53,7 +55,8 @@ EFFICIENCY = Number(
     "computed",
     "bottom of a hole of 140 mm under 17 buttons: 0.64 of isolated craters; less where worn",
 )
-_ASSUMED = (
+# What a rock without own numbers has.
+ASSUMED = (
     Number(
         THRESHOLD,
         MEASURED_THRESHOLD, 2.0, 10.0, "derived",
@@ -79,15 +82,15 @@ def energy_by_strength(strength: float) -> float:
 def breaking_numbers(rock: Rock) -> tuple[Number, ...]:
     """Numbers of a rock for breaking and rotation: its own, else derived or assumed."""
     own = {one.key: one for one in rock.breaking}
-    return tuple(own.get(one.key, one) for one in (_energy(rock), *_ASSUMED))
+    return tuple(own.get(one.key, one) for one in (_energy(rock), *ASSUMED))
 
 
 def _energy(rock: Rock) -> Number:
     if rock.strength is None:
         why = "no strength is known; as of granite and limestone, and twice as far to both sides"
         return Number(ENERGY, _MEASURED, *_WIDE, "assumed", why)
-    low = energy_by_strength(rock.strength.low) * _LOW / _MEASURED
-    high = energy_by_strength(rock.strength.high) * _HIGH / _MEASURED
+    low = energy_by_strength(rock.strength.low) * ENERGY_SHARES[0]
+    high = energy_by_strength(rock.strength.high) * ENERGY_SHARES[1]
     why = "by the strength from craters in granite and limestone"
     value = energy_by_strength(rock.strength.value)
     return Number(ENERGY, value, low, high, "derived", why, rock.strength.second_hand)

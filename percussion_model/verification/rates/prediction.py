@@ -20,6 +20,7 @@ from percussion_model.scene.bits import (
     INCH,
     RULE,
     SPEED,
+    THRESHOLD,
     ButtonBit,
     bit,
     bits,
@@ -27,16 +28,22 @@ from percussion_model.scene.bits import (
 from percussion_model.scene.drive_calibration import calibrate_drive
 from percussion_model.scene.hammers import hammer
 from percussion_model.scene.rocks import STIFFNESS
-from percussion_model.scene.rocks.breaking import CONTACT_SHARE, energy_by_strength
+from percussion_model.scene.rocks.breaking import (
+    ASSUMED,
+    CONTACT_SHARE,
+    ENERGY_SHARES,
+    energy_by_strength,
+)
 from percussion_model.scene.rocks.derived import button_stiffness, mean_factor, pressure_factors
 from percussion_model.scene.scene import Scene
 from percussion_model.verification.rates.cases import DOWN, TOP, Case
 
 # Unloading ratio that the library of rocks has where none is known, and its interval.
 RATIO = (5.0, 2.5, 15.0)
-# Intervals of crushing energy and of the threshold, by their values, as for those rocks.
-ENERGY_SHARES, THRESHOLDS = (46.0 / 55.0, 65.0 / 55.0), (0.4, 2.0)
-RENEWAL, FRICTION = 2e-3, 0.8
+# Interval of the threshold, by its value.
+THRESHOLDS = next(
+    (one.low / one.value, one.high / one.value) for one in ASSUMED if one.key == THRESHOLD
+)
 # The ready-made hammer that a top hammer's bars and damper are of: bits to this diameter [m] have
 # T38 rods, wider ones T45.
 WIDEST_T38, T38, T45, RODS = 0.08, "t38", "t45", 1
@@ -114,6 +121,7 @@ def rock_parameters(case: Case) -> dict[str, Any]:
     factor = mean_factor(pressure_factors().values())
     of_one = button_stiffness(0.5 * mean, case.strength, factor)
     return {
+        **{one.key: one.value for one in ASSUMED},
         **chosen.parameters,
         HOLE: case.bit,
         SPEED: RULE / (case.bit / INCH) * 2.0 * math.pi / 60.0,
@@ -122,8 +130,6 @@ def rock_parameters(case: Case) -> dict[str, Any]:
         "rock.unloading_ratio": RATIO[0],
         "breaking.crushing_energy": energy_by_strength(case.strength),
         "breaking.efficiency": EFFICIENCY,
-        "rotation.renewal_length": RENEWAL,
-        "rotation.friction": FRICTION,
     }
 
 
