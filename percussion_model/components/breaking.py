@@ -13,15 +13,13 @@ from __future__ import annotations
 
 from percussion_model.components import Component
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import inlined
+from percussion_model.physics.kernel import LEAST_DIVISOR, inlined
 
 # Tried on single craters of Kuru granite and St Anne limestone, and on the bottom of a hole
 # drilled by a bit of 17 buttons (docs/breaking.md).
 CRUSHING_ENERGY, THRESHOLD, EFFICIENCY = 5.5e7, 5.0, 0.64
 # Less than this by volume counts as none: a volume by it might overflow [J/m^3].
 LEAST_ENERGY = 1.0
-# Compiled code may divide where the quotient is not used, and hosts trap a division by zero.
-LEAST = 1e-30
 
 
 @inlined
@@ -30,7 +28,7 @@ def sharpness(par, s):
     if par.breaking_wear_length == 0.0:
         return par.breaking_efficiency
     drilled = par.breaking_drilled + s.breaking_volume / par.hole_area
-    fresh = exp(-drilled / max(par.breaking_wear_length, LEAST))
+    fresh = exp(-drilled / max(par.breaking_wear_length, LEAST_DIVISOR))
     return par.breaking_efficiency * (par.breaking_worn + (1.0 - par.breaking_worn) * fresh)
 
 
@@ -39,7 +37,7 @@ def flushed(par, volume):
     """Volume of a blow that the hole gains where flushing limits it [m^3]."""
     if par.breaking_flushed_volume == 0.0:
         return volume
-    return volume / (1.0 + volume / max(par.breaking_flushed_volume, LEAST))
+    return volume / (1.0 + volume / max(par.breaking_flushed_volume, LEAST_DIVISOR))
 
 
 @inlined
@@ -61,7 +59,7 @@ def broken(par, s):
     known = max(par.breaking_buttons * par.breaking_threshold, s.breaking_taken)
     beyond = max(s.breaking_crushed + crushed_here(par, s) - known, 0.0)
     beyond -= max(s.breaking_crushed - known, 0.0)
-    return sharpness(par, s) * beyond / max(par.breaking_crushing_energy, LEAST)
+    return sharpness(par, s) * beyond / max(par.breaking_crushing_energy, LEAST_DIVISOR)
 
 
 @inlined

@@ -14,10 +14,7 @@ from __future__ import annotations
 
 from percussion_model.components import Component
 from percussion_model.physics.elementary import exp
-from percussion_model.physics.kernel import inlined
-
-# Compiled code may divide where the quotient is not used, and hosts trap a division by zero.
-LEAST = 1e-30
+from percussion_model.physics.kernel import LEAST_DIVISOR, inlined
 
 
 @inlined
@@ -36,7 +33,7 @@ def fading(par):
 def kept(par, s, period):
     """Share of their depth that craters keep after a period."""
     length = fading(par)
-    return exp(-arc(par, s, period) / max(length, LEAST)) if length > 0.0 else 0.0
+    return exp(-arc(par, s, period) / max(length, LEAST_DIVISOR)) if length > 0.0 else 0.0
 
 
 @inlined
@@ -45,16 +42,16 @@ def motor_speed(par, s, torque):
     stall, full = par.rotation_stall_torque, par.rotation_full_torque
     if stall == 0.0 or torque <= full:
         return s.rotation_speed
-    return s.rotation_speed * max(stall - torque, 0.0) / max(stall - full, LEAST)
+    return s.rotation_speed * max(stall - torque, 0.0) / max(stall - full, LEAST_DIVISOR)
 
 
 @inlined
 def next_blow(par, s, period, kept, rest, push, climb):
     """Torque of the blow that has ended, and the speed of the next."""
     way, radius = arc(par, s, period), par.rotation_mean_radius
-    slope = climb / max(way, LEAST) if way > 0.0 else 0.0
+    slope = climb / max(way, LEAST_DIVISOR) if way > 0.0 else 0.0
     if way == 0.0 and fading(par) > 0.0:
-        slope = s.pit / max(fading(par), LEAST)  # on which it would begin to climb
+        slope = s.pit / max(fading(par), LEAST_DIVISOR)  # on which it would begin to climb
     rubbing = par.rotation_friction * max(rest, 0.0)
     needed = radius * (max(push, 0.0) * slope + rubbing)
     s.rotation_needed_torque = needed
@@ -66,7 +63,7 @@ def next_blow(par, s, period, kept, rest, push, climb):
     s.e_friction += rubbing * way
     follows = 1.0
     if par.rotation_response > 0.0:
-        follows = 1.0 - exp(-period / max(par.rotation_response, LEAST))
+        follows = 1.0 - exp(-period / max(par.rotation_response, LEAST_DIVISOR))
     off = motor_speed(par, s, needed) - s.rotation_turning_speed
     s.rotation_turning_speed += follows * off
 

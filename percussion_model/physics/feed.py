@@ -7,13 +7,11 @@ the drive has no more force than is held.
 
 from __future__ import annotations
 
-from percussion_model.physics.kernel import inlined
+from percussion_model.physics.kernel import LEAST_DIVISOR, inlined
 from percussion_model.physics.records import DriveKind
 
 # A drive throttled further does not tell its recoil.
 LEAST_THROTTLE = 1e-2
-# Compiled code may divide where the quotient is not used, and hosts trap a division by zero [N].
-LEAST = 1e-30
 
 
 @inlined
@@ -36,7 +34,7 @@ def throttle(par, s):
     if par.on_casing == 0:
         return 1.0
     recoil = full_recoil(par, s)
-    return min(max(held(par, s), 0.0) / max(recoil, LEAST), 1.0) if recoil > 0.0 else 1.0
+    return min(max(held(par, s), 0.0) / max(recoil, LEAST_DIVISOR), 1.0) if recoil > 0.0 else 1.0
 
 
 @inlined
@@ -55,4 +53,4 @@ def note_recoil(par, s, push):
     else:
         full = throttle(par, s) * s.drive_force
         if full > LEAST_THROTTLE * s.drive_force:
-            s.recoil_share = max(push / max(full, LEAST), 0.0)
+            s.recoil_share = max(push / max(full, LEAST_DIVISOR), 0.0)

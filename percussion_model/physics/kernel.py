@@ -23,6 +23,9 @@ def _is_set(name: str) -> bool:
     return False
 
 
+# Compiled code may divide where the quotient is not used, and hosts trap a division by zero: a
+# divisor that may be zero is at least this.
+LEAST_DIVISOR = 1e-30
 # Kernels run as plain Python.
 DISABLED = _is_set("NUMBA_DISABLE_JIT")
 # Numba without scipy's linear algebra (`own_process`).

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 from percussion_model.components import COMPONENTS, Component
-from percussion_model.physics.feed import LEAST, feed_on_bit, note_recoil
-from percussion_model.physics.kernel import composed, inlined, merged
+from percussion_model.physics.feed import feed_on_bit, note_recoil
+from percussion_model.physics.kernel import LEAST_DIVISOR, composed, inlined, merged
 from percussion_model.physics.power_law import unflushed
 from percussion_model.physics.records import Cuttings
 from percussion_model.physics.rock import is_loading, leave_pit, pressed_depth
@@ -85,7 +85,7 @@ def renew(par, s, kept):
     s.p_u -= shift
     s.p -= shift
     s.x_r += shift
-    return s.p_u / max(before, LEAST)
+    return s.p_u / max(before, LEAST_DIVISOR)
 
 
 @inlined
@@ -109,7 +109,7 @@ def move_place(par, s, time):
     period, loads = time - s.place_time, is_loading(s)
     if (par.places == 0 and par.on_casing == 0) or period <= 0.0 or (loads and par.left == 1):
         return
-    push = (s.i_drive - s.place_drive) / max(period, LEAST)
+    push = (s.i_drive - s.place_drive) / max(period, LEAST_DIVISOR)
     s.place_time, s.place_drive = time, s.i_drive
     feed = feed_on_bit(par, s)
     if par.on_casing == 1:
@@ -122,7 +122,7 @@ def move_place(par, s, time):
         s.cycle_from = LARGEST  # it reloads nothing
     kept = kept_of(par, s, period)
     if par.cuttings == Cuttings.BY_BLOW and s.p_u > 0.0:
-        kept = unflushed(par, s.p_u) / max(s.p_u, LEAST)
+        kept = unflushed(par, s.p_u) / max(s.p_u, LEAST_DIVISOR)
     if par.left == 1:
         kept = renew(par, s, kept)
     climb = (1.0 - kept) * s.pit
