@@ -37,7 +37,7 @@ from percussion_model.engine.memory import floats_at, hold, words_at
 from percussion_model.engine.records import MOTION_BYTES, GaugeBar, Kind, Left
 from percussion_model.engine.scene_image import AT, Own, row_of
 from percussion_model.physics.kernel import preparing
-from percussion_model.physics.records import BLOW, TURNS, Piston, Status
+from percussion_model.physics.records import BLOW, DRIVES, DriveKind, Piston, Status
 from percussion_model.physics.state import LARGEST, MOST
 from percussion_model.scene.bars import bar_length, bar_mass
 from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
@@ -134,7 +134,8 @@ def _fill_barrier(head, numbers):
     """Enter shares of the barrier: of a drilling cycle's time and of a blow's energy (eq. 30)."""
     values = numbers.values
     energy = values.drive_force * values.drive_reversal_distance
-    if not (TURNS[values.effects_drive] and energy > 0.0 and barrier_on(numbers)):
+    turns = DRIVES[values.effects_drive] == DriveKind.PRESSURE
+    if not (turns and energy > 0.0 and barrier_on(numbers)):
         return
     share = values.rock_barrier_energy / energy
     took = share * bar_mass(numbers.piston) / values.rock_barrier_damping

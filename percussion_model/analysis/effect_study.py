@@ -126,7 +126,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     """Go through the scene as it is, then one effect after the other."""
     effects = scene.effects
     yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
-    for name in ("gravity", "feed", *(one.name for one in COMPONENTS if _can_turn(scene, one))):
+    for name in ("gravity", "feed", *(one.name for one in COMPONENTS if not one.is_drive and _can_turn(scene, one))):
         yield _switched(name, getattr(effects, name))
     yield from _drive(scene)
     yield from _rock(scene)

@@ -30,11 +30,10 @@ class Component(NamedTuple):
         Default, unit, description, least and greatest value by name; kernels find the
         parameter X as `par.NAME_X`. A default of None has to be given where the component is
         on; one that is true or false makes a flag, a least value of int a whole number.
-    force : kernel or None
-        force(par, s, h) -> mean force over the next time h in which the body moves on, down
-        positive [N]. A mean that is off by h^2 makes a motion that is off by h^2.
-    body : {"bit", "piston"}
-        That it acts on. A force on the piston is part of the drive's.
+    on_piston, on_bit : kernel or None
+        on_...(par, s, h) -> mean force over the next time h in which the body moves on, down
+        positive [N]. A mean that is off by h^2 makes a motion that is off by h^2. A force on
+        the piston is part of the drive's.
     state : mapping of tuple
         Unit, description and start of each field by name: a number, or the name of a parameter
         that holds it. Kernels find the field X as `s.NAME_X`, and it is a column `NAME_X`.
@@ -61,13 +60,21 @@ class Component(NamedTuple):
         add to `s.e_ENTRY`.
     needs : mapping of tuple
         What must hold for it to matter: values that a key may have, by the key.
+    is_drive : bool
+        It is a choice of `effects.drive`, by its name, and no switch; its works are the drive's,
+        and it sets `s.armed` where the next closure of the gap begins a blow.
+    lasts : kernel or None
+        lasts(par, s) -> time for which its mean forces may be taken as constant [s]. Without
+        it modes make no leaps.
+    hidden : tuple of str
+        Further fields of the state, which start at 0 and are no columns.
     """
 
     name: str
     description: str
     parameters: Mapping[str, tuple[float | bool | None, str, str, float, float]]
-    force: Callable[..., float] | None = None
-    body: Literal["bit", "piston"] = "bit"
+    on_piston: Callable[..., float] | None = None
+    on_bit: Callable[..., float] | None = None
     state: Mapping[str, tuple[str, str, float | str]] = _NOTHING
     pass_time: Callable[..., None] | None = None
     inputs: tuple[str, ...] = ()
@@ -78,17 +85,32 @@ class Component(NamedTuple):
     of_blow: tuple[str, ...] = ()
     entries: Mapping[str, tuple[Literal["work", "dissipated"], str]] = _NOTHING
     needs: Mapping[str, tuple[Any, ...]] = _NOTHING
+    is_drive: bool = False
+    lasts: Callable[..., float] | None = None
+    hidden: tuple[str, ...] = ()
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Names of its state's fields in the state of a solver."""
+        """Names of its state's fields in the state of a solver, those that are columns."""
         return tuple(f"{self.name}_{field}" for field in self.state)
+
+    @property
+    def switch(self) -> tuple[str, Any]:
+        """Key that turns it on, and the value for that."""
+        return ("effects.drive", self.name) if self.is_drive else (f"effects.{self.name}", True)
+
+    @property
+    def pushes(self) -> tuple[str, ...]:
+        """Bodies that it pushes."""
+        forces = {"bit": self.on_bit, "piston": self.on_piston}
+        return tuple(body for body, force in forces.items() if force is not None)
 
     @property
     def ledger(self) -> dict[str, tuple[str, str]]:
         """Entries of the ledger, that of its force before others: side and meaning by name."""
-        taken = f"taken from the {self.body} by this force"
-        of_force = {} if self.force is None else {self.name: ("dissipated", taken)}
+        taken = f"taken from the {' and the '.join(self.pushes)} by this force"
+        is_own = self.pushes and not self.is_drive
+        of_force = {self.name: ("dissipated", taken)} if is_own else {}
         return {**of_force, **self.entries}
 
 
@@ -99,7 +121,9 @@ def _components() -> tuple[Component, ...]:
 
 COMPONENTS = _components()
 # Those that push.
-FORCES = tuple(one for one in COMPONENTS if one.force is not None)
+FORCES = tuple(one for one in COMPONENTS if one.pushes)
+# Those that are drives.
+DRIVES = tuple(one for one in COMPONENTS if one.is_drive)
 
 
 def entries_on(side: str) -> tuple[str, ...]:

@@ -184,7 +184,9 @@ def starts_blow(par, s, time):
     """Whether a closure of the gap at `time` starts a blow; no two start at one instant."""
     if s.b_started == 1 and time <= s.b_time:
         return False
-    return s.armed == 1 or (par.drive != DriveKind.PRESSURE and time - s.t_open >= par.rearm_time)
+    if s.armed == 1 or par.drive == DriveKind.PRESSURE or par.drive == DriveKind.COMPONENT:
+        return s.armed == 1
+    return time - s.t_open >= par.rearm_time
 
 
 @inlined

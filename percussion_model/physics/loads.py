@@ -6,17 +6,15 @@ The drive is a switching pressure law on the mean relative motion, docs/model.md
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
-from percussion_model.components import COMPONENTS, FORCES, Component
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.blows import push_event
 from percussion_model.physics.feed import feed_on_bit, throttle
 from percussion_model.physics.kernel import composed, inlined, merged
 from percussion_model.physics.records import DriveKind, EventKind
 
-_ON_BIT = [one for one in FORCES if one.body == "bit"]
-_ON_PISTON = [one for one in FORCES if one.body == "piston"]
 
 
 @composed
@@ -24,14 +22,39 @@ def _no_force(par: Any, s: Any, h: float) -> float:
     return 0.0
 
 
+def _and_drive(before: Callable, one: Component) -> Callable:
+    if not (one.is_drive and one.on_bit):
+        return before
+    held = f"f_{one.name}_bit"
+
+    @composed
+    def add(s: Any, h: float) -> None:
+        before(s, h)
+        s.i_on_bit += s[held] * h
+
+    return add
+
+
+@composed
+def _no_drive(s: Any, h: float) -> None:
+    pass
+
+
+@composed
+def _always(par: Any, s: Any) -> float:
+    return math.inf
+
+
 @composed
 def _nothing(par: Any, s: Any, amount: float) -> None:
     pass
 
 
-def _and_force(before: Callable, one: Component) -> Callable:
-    force: Any
-    force, present, held = one.force, f"with_{one.name}", f"f_{one.name}"
+def _and_force(before: Callable, one: Component, body: str) -> Callable:
+    force = getattr(one, f"on_{body}")
+    if force is None:
+        return before
+    present, held = f"with_{one.name}", f"f_{one.name}_{body}"
 
     @composed
     def hold(par: Any, s: Any, h: float) -> float:
@@ -44,13 +67,17 @@ def _and_force(before: Callable, one: Component) -> Callable:
     return hold
 
 
-def _and_work(before: Callable, one: Component) -> Callable:
-    held, entry = f"f_{one.name}", f"e_{one.name}"
+def _and_work(before: Callable, one: Component, body: str) -> Callable:
+    if body not in one.pushes:
+        return before
+    held, entry, sign = f"f_{one.name}_{body}", f"e_{one.name}", -1.0
+    if one.is_drive:
+        entry, sign = "e_drive", 1.0
 
     @composed
     def book(par: Any, s: Any, path: float) -> None:
         before(par, s, path)
-        s[entry] -= s[held] * path
+        s[entry] += sign * s[held] * path
 
     return book
 
@@ -69,28 +96,40 @@ def _and_time(before: Callable, one: Component) -> Callable:
     return pass_on
 
 
-def _joined(start: Callable, add: Callable, components: Iterable[Component]) -> Callable:
-    for one in components:
-        start = add(start, one)
+def _and_lasting(before: Callable, one: Component) -> Callable:
+    if one.lasts is None:  # with others that push no force is held (`steps`)
+        return before
+    lasts, present = one.lasts, f"with_{one.name}"
+
+    @composed
+    def until(par: Any, s: Any) -> float:
+        return min(before(par, s), lasts(par, s)) if par[present] == 1 else before(par, s)
+
+    return until
+
+
+def _joined(start: Callable, add: Callable, *more: str) -> Callable:
+    for one in COMPONENTS:
+        start = add(start, one, *more)
     return start
 
 
 # hold_...(par, s, h): take the mean force of each component over the next h; their sum [N].
-hold_on_bit = _joined(_no_force, _and_force, _ON_BIT)
-
-
-hold_on_piston = _joined(_no_force, _and_force, _ON_PISTON)
-
+hold_on_bit = _joined(_no_force, _and_force, "bit")
+hold_on_piston = _joined(_no_force, _and_force, "piston")
 
 # book_...(par, s, path): enter what the held forces take from a body over a path [m].
-book_on_bit = _joined(_nothing, _and_work, _ON_BIT)
-
-
-book_on_piston = _joined(_nothing, _and_work, _ON_PISTON)
-
+book_on_bit = _joined(_nothing, _and_work, "bit")
+book_on_piston = _joined(_nothing, _and_work, "piston")
 
 # pass_own_time(par, s, h): take the states of components on by h [s].
-pass_own_time = _joined(_nothing, _and_time, COMPONENTS)
+pass_own_time = _joined(_nothing, _and_time)
+
+# note_drive(s, h): enter the impulse of drives on the bit.
+note_drive = _joined(_no_drive, _and_drive)
+
+# lasting(par, s): time for which mean forces may be held [s].
+lasting = _joined(_always, _and_lasting)
 
 
 @merged
@@ -105,6 +144,7 @@ def hold_components(par, s, h):
 def pass_time(par, s, h):
     """Take the states of components on by a time h, at whose end the bodies are."""
     if par.effects == 1:
+        note_drive(s, h)
         pass_own_time(par, s, h)
 
 

@@ -109,8 +109,9 @@ def move_place(par, s, time):
     period, loads = time - s.place_time, is_loading(s)
     if (par.places == 0 and par.on_casing == 0) or period <= 0.0 or (loads and par.left == 1):
         return
-    push = (s.i_drive - s.place_drive) / max(period, LEAST_DIVISOR)
-    s.place_time, s.place_drive = time, s.i_drive
+    given = s.i_drive + s.i_on_bit
+    push = (given - s.place_drive) / max(period, LEAST_DIVISOR)
+    s.place_time, s.place_drive = time, given
     feed = feed_on_bit(par, s)
     if par.on_casing == 1:
         note_recoil(par, s, push)

@@ -61,11 +61,12 @@ class DriveKind(IntEnum):
     NONE = 0
     PRESSURE = 1  # switching pressure law, docs/model.md eq. 13
     EXTERNAL = 2  # a force from outside
+    COMPONENT = 3  # one of the components that are drives
 
 
-# Drives by the choice of `effects.drive`, and which of them turn by themselves.
-DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
-TURNS = (True, False, False)
+# Drives by the choice of `effects.drive`.
+BUILT_IN_DRIVES = (DriveKind.PRESSURE, DriveKind.EXTERNAL, DriveKind.NONE)
+DRIVES = (*BUILT_IN_DRIVES, *(DriveKind.COMPONENT for one in COMPONENTS if one.is_drive))
 
 
 class RockKind(IntEnum):

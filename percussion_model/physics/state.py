@@ -41,6 +41,7 @@ COMMON_PARAMETERS = [
     ("hole_area", "f8"),  # [m2], 0 where it is not known
     ("places", "i8"),  # 1: from blow to blow the bit climbs out of its craters, or turns
     ("effects", "i8"),  # 1: there are components that push
+    ("steps", "i8"),  # 1: forces of one of them hold for no longer than a step
     *[(f"with_{one.name}", "i8") for one in COMPONENTS],
     *[(f"{one.name}_{name}", "f8") for one in COMPONENTS for name in one.parameters],
 ]
@@ -77,9 +78,10 @@ _INPUTS = [  # changed from outside at grid points
     ("next_w_r", "f8"),
     ("f_on_bit", "f8"),  # sums of the forces of components [N]
     ("f_on_piston", "f8"),
-    *[(f"f_{one.name}", "f8") for one in FORCES],
+    *[(f"f_{one.name}_{body}", "f8") for one in FORCES for body in one.pushes],
     *[(f"{one.name}_{name}", "f8") for one in COMPONENTS for name in one.inputs],
     *[(field, "f8") for one in COMPONENTS for field in one.fields],
+    *[(f"{one.name}_{field}", "f8") for one in COMPONENTS for field in one.hidden],
 ]
 
 _MOTION = [
@@ -119,6 +121,7 @@ _SUMS = [
     ("i_contact", "f8"),  # impulses [N s]
     ("i_bit", "f8"),
     ("i_drive", "f8"),
+    ("i_on_bit", "f8"),  # of drives on the bit
     ("rock_work", "f8"),  # [J]
     *[(name, "f8") for name in LEDGER_ENTRIES],  # [J]
     # greatest forces since a time that the observer sets; infinite: nobody asks

@@ -454,19 +454,28 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
     """
     groups = dict(_BUILT_IN)
     switches: dict[str, Any] = {}
+    drives: dict[str, str] = {}
     for one in components:
         if one.name in groups or one.name in switches or one.name in _BUILT_IN["effects"].rows:
             raise ValueError(f"component {one.name}: there is a group or a switch of this name")
         if both := set(one.parameters) & set(one.state):
             raise ValueError(f"component {one.name}: {both.pop()} is a parameter and a field")
-        switches[one.name] = flag(False, one.description, dict(one.needs))
-        needs: Needs = {f"effects.{one.name}": (True,), **one.needs}
+        key, value = one.switch
+        needs: Needs = {key: (value,), **one.needs}
+        if one.is_drive:
+            drives[one.name] = one.description
+        else:
+            switches[one.name] = flag(False, one.description, dict(one.needs))
         fields = {name: _parameter(*described, needs) for name, described in one.parameters.items()}
         if fields:
             name_of_class = one.name.title().replace("_", "") + "Group"
             groups[one.name] = _group(name_of_class, Parameters, one.description, fields)
+    plain = _BUILT_IN["effects"]
+    if drives:
+        row = plain.rows["drive"]
+        known = "; ".join([row.description, *(f"{name}: {of}" for name, of in drives.items())])
+        switches["drive"] = choice(row.default, (*row.choices, *drives), known, row.needs)
     if switches:
-        plain = _BUILT_IN["effects"]
         groups["effects"] = _group("Effects", plain, plain.__doc__, switches)
     for key, group in groups.items():
         group.key = key

@@ -329,7 +329,7 @@ def _fall(result: Result) -> dict[str, float]:
     if len(touching):
         found["first_contact"] = float(modes["time"][touching[0]])
         left = np.flatnonzero(modes["kind"][touching[0] :] == Mode.FF) + touching[0]
-        pushed = any(scene[f"effects.{one.name}"] for one in FORCES)
+        pushed = any(scene[one.switch[0]] == one.switch[1] for one in FORCES)
         if len(left) and not pushed and scene.piston.model == "absent":  # a flight undisturbed
             found["rebound_velocity"] = _leaving_velocity(result, modes, int(left[0]))
         if modes["kind"][-1] == Mode.SS:

@@ -65,35 +65,53 @@ def _nothing(record: Any, values: Any) -> None:
     pass
 
 
-def _and_number(before: Callable, field: str, value: str) -> Callable:
+def _number(field: str, value: str) -> Callable:
     @composed
     def fill(record: Any, values: Any) -> None:
-        before(record, values)
         record[field] = values[value]
 
     return fill
 
 
-def _and_constant(before: Callable, field: str, value: float) -> Callable:
+def _constant(field: str, value: float) -> Callable:
     @composed
     def fill(record: Any, values: Any) -> None:
-        before(record, values)
         record[field] = value
 
     return fill
 
 
-def _and_component(before: Callable, one: Component, numbers: Callable) -> Callable:
-    switch, present = f"effects_{one.name}", f"with_{one.name}"
-    pushes, moves = one.force is not None, setup.follows_blows(one)
+def _both(one: Callable, other: Callable) -> Callable:
+    @composed
+    def fill(record: Any, values: Any) -> None:
+        one(record, values)
+        other(record, values)
+
+    return fill
+
+
+def _all(fills: list[Callable]) -> Callable:
+    """One kernel that calls all; by halves, since a compiler goes down into each call."""
+    if len(fills) < 2:
+        return fills[0] if fills else _nothing
+    middle = len(fills) // 2
+    return _both(_all(fills[:middle]), _all(fills[middle:]))
+
+
+def _component(one: Component) -> Callable:
+    (switch, number), present = setup.switch_of(one), f"with_{one.name}"
+    pushes, moves = len(one.pushes) > 0, setup.follows_blows(one)
+    steps = pushes and one.lasts is None
+    numbers = _all([_number(name, name) for name in (f"{one.name}_{of}" for of in one.parameters)])
 
     @composed
     def fill(p: Any, values: Any) -> None:
-        before(p, values)
-        if values[switch]:
+        if values[switch] == number:
             p[present] = 1
             if pushes:
                 p["effects"] = 1
+            if steps:
+                p["steps"] = 1
             if moves:
                 p["places"] = 1
             numbers(p, values)
@@ -102,25 +120,20 @@ def _and_component(before: Callable, one: Component, numbers: Callable) -> Calla
 
 
 def _parameters(p, values):
-    fill = _nothing
-    for one in COMPONENTS:
-        numbers = _nothing
-        for name in one.parameters:
-            numbers = _and_number(numbers, f"{one.name}_{name}", f"{one.name}_{name}")
-        fill = _and_component(fill, one, numbers)
+    fill = _all([_component(one) for one in COMPONENTS])
     return lambda p, values: fill(p, values)
 
 
 def _states(s, values):
-    fill = _nothing
+    fills = []
     for one in COMPONENTS:
-        for name in one.inputs:
-            fill = _and_number(fill, f"{one.name}_{name}", f"{one.name}_{name}")
+        fills += [_number(name, name) for name in (f"{one.name}_{of}" for of in one.inputs)]
         for field, (_, _, start) in zip(one.fields, one.state.values(), strict=True):
-            if isinstance(start, str):
-                fill = _and_number(fill, field, f"{one.name}_{start}")
-            else:
-                fill = _and_constant(fill, field, float(start))
+            is_name = isinstance(start, str)
+            fills.append(
+                _number(field, f"{one.name}_{start}") if is_name else _constant(field, float(start))
+            )
+    fill = _all(fills)
     return lambda s, values: fill(s, values)
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from percussion_model.components import COMPONENTS, Component
-from percussion_model.physics.records import DRIVES, TURNS, Mode, Piston
+from percussion_model.components import DRIVES as ADDED_DRIVES
+from percussion_model.physics.records import BUILT_IN_DRIVES, DRIVES, DriveKind, Mode, Piston
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.contradictions import ON_CASING
 from percussion_model.scene.numbers import Numbers
@@ -113,13 +114,23 @@ def follows_blows(one: Component) -> bool:
     return any(kernel is not None for kernel in kernels)
 
 
+def switch_of(one: Component) -> tuple[str, int]:
+    """Field of a scene's numbers that turns a component on, and its number then."""
+    if one.is_drive:
+        return "effects_drive", len(BUILT_IN_DRIVES) + ADDED_DRIVES.index(one)
+    return f"effects_{one.name}", 1
+
+
 def fill_components(p: Any, values: Any) -> None:
     """Fill the parameters of the components that are on."""
     for one in COMPONENTS:
-        if getattr(values, f"effects_{one.name}"):
+        field, number = switch_of(one)
+        if getattr(values, field) == number:
             p[f"with_{one.name}"] = 1
-            if one.force is not None:
+            if one.pushes:
                 p["effects"] = 1
+                if one.lasts is None:
+                    p["steps"] = 1
             if follows_blows(one):
                 p["places"] = 1
             for name in one.parameters:
@@ -152,7 +163,8 @@ def fill_start(s: Any, numbers: Numbers) -> None:
     s["live"] = 1
     s["mode"] = Mode.FF
     s["alpha"] = direction
-    s["armed"] = not TURNS[values.effects_drive] or direction > 0
+    kind = DRIVES[values.effects_drive]
+    s["armed"] = kind != DriveKind.COMPONENT and (kind != DriveKind.PRESSURE or direction > 0)
     s["feed"] = values.feed_force if values.effects_feed else 0.0
     s["drive_force"] = values.drive_force
     s["reversal"] = values.drive_reversal_distance

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from percussion_model.physics.blows import end_with_blow, push_checkpoint
+from percussion_model.physics.blows import FASTEST, end_with_blow, push_checkpoint
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import (
     bit_acceleration,
     drive_force,
+    hold_components,
+    lasting,
     pass_time,
     piston_acceleration,
     room_to_turn,
@@ -104,6 +106,18 @@ def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
     v = s.v_p - v_b
     room = s.u_b - s.u_p - s.spread_p - spread_top - spread_mean
     return time_to_cover(room, v, a), until_drive(par, s, v, a, spread_mean)
+
+
+@merged
+def hold_on(par, s):
+    """Hold mean forces of components where that is over; ticks for which they hold from now on."""
+    if par.effects == 0:
+        return LONGEST
+    if s.time >= s.held_until:
+        ticks = max(int(lasting(par, s) / par.tick), 1)
+        hold_components(par, s, ticks * par.tick)
+        s.held_until = s.time + ticks
+    return s.held_until - s.time
 
 
 @merged
@@ -251,6 +265,7 @@ def plan(par, s, bars, law, most, events):
     """
     if has_piston(par) and s.parked == 0 and s.closed == 0 and s.time >= s.no_park:
         park(par, s, bars)
+    most = min(most, hold_on(par, s))
     ready(par, s, bars, law)
     if s.mode == Mode.SS and s.alert == 1 and is_crushable(par):
         most = watch_barrier(par, s, bars, most, events)
@@ -363,6 +378,8 @@ def time_of_blow(par_, state, bars_):
     bars = refer(bars_)
     law = law_wanted(par, s, bars.laws)
     ticks = portion(s, law) if law >= 0 else 1 << level_of_step(par, s, bars)
+    if s.gap > FASTEST * (ticks * par.tick):
+        return 0.0
     return end_with_blow(par, s, (s.time + ticks) * par.tick)
 
 

@@ -13,6 +13,7 @@ from percussion_model.physics.loads import (
     book_bit_load,
     book_piston_load,
     drive_force,
+    pass_time,
     room_to_turn,
     switch_drive,
 )
@@ -222,6 +223,7 @@ def book_way(par, s, bars, ticks, look):
     elif has_piston(par):
         book_flight(par, s, h, v_b, look)
     s.time += ticks
+    pass_time(par, s, h)
     s.stride = min(2 * s.stride, LONGEST_STRIDE)
     if s.mode == Mode.SS:
         last = s.check_time[(s.n_check - 1) % CHECKPOINTS]

@@ -57,7 +57,7 @@ class Sums(NamedTuple):
 @merged
 def law_in(par, s, laws, form):
     """Law by which the present mode moves in a form; -1 where it has to be stepped."""
-    if par.effects == 1 or not follows_form(par, s):
+    if par.steps == 1 or not follows_form(par, s):
         return -1
     if s.closed == 1 and s.mode == Mode.SS and s.alert == 1:
         return -1  # the bit's own energy is known by its modes

@@ -119,7 +119,7 @@ def fill_modal_parameters(p, numbers):
     p["bound_t"] = math.sqrt(end_compliance(numbers.bit, True))
     p["k_r"], p["gamma"], p["c_r"] = rock.k_r, rock.gamma, rock.c_r
     # forces that change from step to step leave no law that pairs could go by
-    p["leaps"] = numbers.values.solver_leaps and p["effects"] == 0
+    p["leaps"] = numbers.values.solver_leaps and p["steps"] == 0
     return Request(p["mass_p"], rock_springs(numbers), rock.c_r, highest, eta, tick)
 
 

@@ -263,6 +263,7 @@ MODAL_STATE = np.dtype(
         ("piston_time", "i8"),
         ("no_park", "i8"),
         ("closed_at", "i8"),
+        ("held_until", "i8"),  # mean forces of components are held
         ("rest_until", "i8"),  # no front of a blow on a bit at rest can be at the rock before
         ("alert", "i8"),  # 1: standstill may end by the energy of the bit
         ("form", "i8"),
@@ -324,6 +325,7 @@ MODAL_LIMITS = Limits(
         "piston_time": COUNT,
         "no_park": COUNT,
         "closed_at": COUNT,
+        "held_until": COUNT,
         "rest_until": COUNT,
         "alert": FLAG,
         "form": (0, 5),

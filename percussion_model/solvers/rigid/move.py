@@ -242,4 +242,5 @@ def move(par, s, tau):
     s.v_p = v_p
     s.gap = gap
     book_rock(par, s, p_before, taken)
+    s.u_r = -s.gap
     pass_time(par, s, tau)

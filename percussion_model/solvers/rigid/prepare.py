@@ -40,6 +40,7 @@ def begin(p, s, numbers):
     if p.piston == Piston.ABSENT:
         s.gap = 0.0
     s.start_gap = s.gap
+    s.u_r = -s.gap
     s.ss_force = math.nan
     if p.piston != Piston.ABSENT and s.gap == 0.0 and s.v_p == s.v_b:
         s.held = 1

@@ -216,6 +216,7 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
 @kernel
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
+    s.closed = s.held
     hold_components(par, s, par.window)
     find_next(par, s)
     if par.effects == 1 and 0.0 < s.next_tau < par.window:

@@ -37,7 +37,9 @@ def _demands(scene: Any) -> Iterator[tuple[str, str, bool]]:
     yield "cuttings", "effects.cuttings must be false", left
     yield "casing", "feed.on must not be 'casing'", effects.feed and scene.feed.on == "casing"
     for one in COMPONENTS:
-        yield one.name, f"effects.{one.name} must be false", getattr(effects, one.name)
+        key, value = one.switch
+        demand = "be false" if value is True else f"not be {value!r}"
+        yield one.name, f"{key} must {demand}", scene[key] == value
 
 
 def refuse_uncarried(peer: str, scene: Scene, carried: Collection[str] = ()) -> None:

@@ -1,0 +1,502 @@
+"""Pneumatic drive: two chambers and an exhaust volume, with ports that the piston opens.
+
+The piston is x above the bit. Between its lower face and the bit is the lower chamber, above it
+the upper one; each fills from the supply and empties into the exhaust volume, from which flushing
+holes lead to the hole (docs/model.md, eqs 30 to 34). The force
+
+    F = p_u A_u - p_l A_l - p_b (A_u - A_l) + friction
+
+pushes the piston down, and the gas of the lower chamber stands on the bit. What the gas will do is
+foretold with a rigid piston for a short time, in which solvers take its mean forces; then it is
+made out on the way that the bodies really went, and what was given too little is given later.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from percussion_model.components import Component
+from percussion_model.physics.gas import (
+    AIR,
+    RATIO,
+    Volume,
+    flow,
+    relaxation,
+    reservoir,
+    volume_of,
+)
+from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
+
+# The gas is foretold for so long [s]; an integration takes no longer steps than the second.
+AHEAD, LONGEST = 2e-4, 1e-4
+# Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
+STABLE = 2.2
+# Most steps of one integration: a volume a thousandth of a usual one needs 1,300.
+MOST_STEPS = 20_000
+# Of a chamber that a piston fills no less than this share of its volume is left.
+LEAST_SHARE = 1e-4
+# A way foretold to this is the real one but for the work of the difference [m].
+NEAR = 1e-5
+# A piston that is faster or slower by this than was foretold has met something [m/s].
+JUMP = 1.0
+# Friction has its full value from some times this speed on [m/s].
+CREEP = 1e-2
+
+
+class Gas(NamedTuple):
+    """Masses [kg] and internal energies [J] of upper and lower chamber and exhaust volume."""
+
+    mass_u: float
+    energy_u: float
+    mass_l: float
+    energy_l: float
+    mass_x: float
+    energy_x: float
+
+
+class Ahead(NamedTuple):
+    """Gas, and what it does on the way."""
+
+    gas: Gas
+    x: float  # piston above the bit [m]
+    v: float  # its velocity, up [m/s]
+    used: float  # air from the supply [kg]
+    impulse: float  # on the piston, down [N s]
+    on_bit: float  # on the bit [N s]
+    work: float  # on the piston's motion relative to the bit [J]
+
+
+@inlined
+def size_of_upper(par, x):
+    """Volume of the upper chamber [m^3]."""
+    most = par.pneumatic_upper_volume
+    return max(most - par.pneumatic_upper_area * x, LEAST_SHARE * most)
+
+
+@inlined
+def size_of_lower(par, x):
+    """Volume of the lower chamber [m^3]."""
+    least = par.pneumatic_lower_volume
+    return max(least + par.pneumatic_lower_area * x, LEAST_SHARE * least)
+
+
+@inlined
+def opened(par, area, way):
+    """Effective area of a port that the piston has passed by a way, and of the leak beside it."""
+    share = min(max(way / par.pneumatic_ramp, 0.0), 1.0)
+    return par.pneumatic_discharge * (area * share + par.pneumatic_leak)
+
+
+@inlined
+def outside(par):
+    """Pressure behind the flushing holes [Pa]."""
+    return par.pneumatic_ambient_pressure + par.pneumatic_back_pressure
+
+
+@kernel
+def rates_of(par, supply, y):
+    """What changes in a second; `x` and `v` as those of a free piston above a bit at rest."""
+    gas, x, v = y.gas, y.x, y.v
+    upper = volume_of(gas.mass_u, gas.energy_u, size_of_upper(par, x))
+    lower = volume_of(gas.mass_l, gas.energy_l, size_of_lower(par, x))
+    behind = volume_of(gas.mass_x, gas.energy_x, par.pneumatic_exhaust_volume)
+    air = reservoir(supply, par.pneumatic_supply_temperature)
+    open_air = reservoir(outside(par), par.pneumatic_ambient_temperature)
+    share = par.pneumatic_discharge
+    to_upper = flow(air, upper, opened(
+        par, par.pneumatic_upper_intake, x - par.pneumatic_upper_intake_edge))  # fmt: skip
+    to_lower = flow(air, lower, opened(
+        par, par.pneumatic_lower_intake, par.pneumatic_lower_intake_edge - x))  # fmt: skip
+    from_upper = flow(upper, behind, opened(
+        par, par.pneumatic_upper_exhaust, par.pneumatic_upper_exhaust_edge - x))  # fmt: skip
+    from_lower = flow(lower, behind, opened(
+        par, par.pneumatic_lower_exhaust, x - par.pneumatic_lower_exhaust_edge))  # fmt: skip
+    across = flow(upper, lower, share * par.pneumatic_leak)
+    past = flow(air, behind, share * par.pneumatic_bypass)
+    out = flow(behind, open_air, share * par.pneumatic_flushing)
+    wall, cold = par.pneumatic_wall_conductance, par.pneumatic_wall_temperature
+    heat_u = wall * (cold - upper.root * upper.root / AIR)
+    heat_l = wall * (cold - lower.root * lower.root / AIR)
+    area_u, area_l = par.pneumatic_upper_area, par.pneumatic_lower_area
+    grow_u = -area_u * v if area_u * x < (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume else 0.0
+    rubbing = par.pneumatic_friction * v / math.sqrt(v * v + CREEP * CREEP)
+    force = upper.pressure * area_u - lower.pressure * area_l
+    force += rubbing - outside(par) * (area_u - area_l)
+    return Ahead(
+        Gas(
+            to_upper.mass - from_upper.mass - across.mass,
+            to_upper.energy - from_upper.energy - across.energy - upper.pressure * grow_u + heat_u,
+            to_lower.mass - from_lower.mass + across.mass,
+            to_lower.energy
+            - from_lower.energy
+            + across.energy
+            - lower.pressure * area_l * v
+            + heat_l,
+            past.mass + from_upper.mass + from_lower.mass - out.mass,
+            past.energy + from_upper.energy + from_lower.energy - out.energy,
+        ),
+        v,
+        -force / par.mass_p - par.gravity,
+        to_upper.mass + to_lower.mass + past.mass,
+        force,
+        (lower.pressure - outside(par)) * area_l,
+        -force * v,
+    )
+
+
+@inlined
+def fastest(par, y):
+    """Greatest rate at which one of the volumes comes to a pressure [1/s]."""
+    gas, share = y.gas, par.pneumatic_discharge
+    leaks = 3.0 * par.pneumatic_leak
+    sides = par.pneumatic_upper_exhaust + par.pneumatic_upper_intake + leaks
+    root = math.sqrt((RATIO - 1.0) * gas.energy_u / gas.mass_u)
+    most = relaxation(root, share * sides, size_of_upper(par, y.x))
+    sides = par.pneumatic_lower_exhaust + par.pneumatic_lower_intake + leaks
+    root = math.sqrt((RATIO - 1.0) * gas.energy_l / gas.mass_l)
+    most = max(most, relaxation(root, share * sides, size_of_lower(par, y.x)))
+    sides = par.pneumatic_flushing + par.pneumatic_bypass + leaks
+    sides += max(par.pneumatic_upper_exhaust, par.pneumatic_lower_exhaust)
+    root = math.sqrt((RATIO - 1.0) * gas.energy_x / gas.mass_x)
+    return max(most, relaxation(root, share * sides, par.pneumatic_exhaust_volume))
+
+
+@inlined
+def plus(y, rate, h):
+    """What `y` is after a time at a rate."""
+    gas, g = y.gas, rate.gas
+    return Ahead(
+        Gas(
+            gas.mass_u + h * g.mass_u,
+            gas.energy_u + h * g.energy_u,
+            gas.mass_l + h * g.mass_l,
+            gas.energy_l + h * g.energy_l,
+            gas.mass_x + h * g.mass_x,
+            gas.energy_x + h * g.energy_x,
+        ),
+        y.x + h * rate.x,
+        y.v + h * rate.v,
+        y.used + h * rate.used,
+        y.impulse + h * rate.impulse,
+        y.on_bit + h * rate.on_bit,
+        y.work + h * rate.work,
+    )
+
+
+class Way(NamedTuple):
+    """A way of the piston above the bit, by what it is at both ends."""
+
+    known: bool  # else the piston flies
+    x: float  # [m]
+    v: float  # [m/s]
+    then_x: float
+    then_v: float
+    span: float  # [s]
+
+
+@inlined
+def on_way(way, y, t):
+    """The same gas with the piston where the way has it after a time."""
+    if not way.known:
+        return y
+    d, q = way.span, t / way.span
+    bend = 3.0 * (way.then_x - way.x) - d * (2.0 * way.v + way.then_v)
+    turn = 2.0 * (way.x - way.then_x) + d * (way.v + way.then_v)
+    x = way.x + q * (d * way.v + q * (bend + q * turn))
+    v = way.v + q * (2.0 * bend + 3.0 * q * turn) / d
+    return Ahead(y.gas, x, v, y.used, y.impulse, y.on_bit, y.work)
+
+
+@kernel
+def go(par, supply, y, way):
+    """Integrate the gas over a way, or with a piston that flies; classical Runge-Kutta steps."""
+    t, left = 0.0, way.span
+    for _ in range(MOST_STEPS):
+        h = min(LONGEST, STABLE / fastest(par, y))
+        h = left / math.ceil(left / h - 1e-9)
+        a = rates_of(par, supply, on_way(way, y, t))
+        b = rates_of(par, supply, on_way(way, plus(y, a, 0.5 * h), t + 0.5 * h))
+        c = rates_of(par, supply, on_way(way, plus(y, b, 0.5 * h), t + 0.5 * h))
+        d = rates_of(par, supply, on_way(way, plus(y, c, h), t + h))
+        y = plus(plus(plus(plus(y, a, h / 6.0), b, h / 3.0), c, h / 3.0), d, h / 6.0)
+        t += h
+        y = on_way(way, y, t)
+        left -= h
+        if left <= 1e-9 * way.span:
+            break
+    return y
+
+
+@inlined
+def present_gas(s):
+    """Gas as a state has it."""
+    return Gas(
+        s.pneumatic_mass_u,
+        s.pneumatic_energy_u,
+        s.pneumatic_mass_l,
+        s.pneumatic_energy_l,
+        s.pneumatic_mass_x,
+        s.pneumatic_energy_x,
+    )
+
+
+@inlined
+def keep_gas(par, s, gas):
+    """Put gas into the state."""
+    s.pneumatic_mass_u, s.pneumatic_energy_u = gas.mass_u, gas.energy_u
+    s.pneumatic_mass_l, s.pneumatic_energy_l = gas.mass_l, gas.energy_l
+    s.pneumatic_mass_x, s.pneumatic_energy_x = gas.mass_x, gas.energy_x
+    x = -s.u_r
+    s.pneumatic_upper_pressure = (RATIO - 1.0) * gas.energy_u / size_of_upper(par, x)
+    s.pneumatic_lower_pressure = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, x)
+    s.pneumatic_exhaust_pressure = (RATIO - 1.0) * gas.energy_x / par.pneumatic_exhaust_volume
+
+
+@inlined
+def set_pressure(par, s):
+    """Pressure at which the supply is held where it can be [Pa]."""
+    return s.pneumatic_supply_pressure + par.pneumatic_ambient_pressure
+
+
+@inlined
+def begin(par, s):
+    """Fill all volumes for the first time: with air of the surroundings, the supply's with its."""
+    x, warm = -s.u_r, AIR * par.pneumatic_ambient_temperature
+    p, q = outside(par) / warm, outside(par) / (RATIO - 1.0)
+    u, low, behind = size_of_upper(par, x), size_of_lower(par, x), par.pneumatic_exhaust_volume
+    keep_gas(par, s, Gas(p * u, q * u, p * low, q * low, p * behind, q * behind))
+    s.pneumatic_supply = set_pressure(par, s)
+    s.pneumatic_last_u = s.u_r
+
+
+@inlined
+def feed_supply(par, s, used, h):
+    """Take air from the supply, and let the compressor give as much as it may."""
+    if par.pneumatic_supply_volume == 0.0:
+        s.pneumatic_supply = set_pressure(par, s)
+        return
+    by_mass = AIR * par.pneumatic_supply_temperature / par.pneumatic_supply_volume
+    s.pneumatic_supply -= by_mass * used
+    wanted = max(set_pressure(par, s) - s.pneumatic_supply, 0.0)
+    if s.pneumatic_supply_flow > 0.0:
+        wanted = min(wanted, by_mass * s.pneumatic_supply_flow * h)
+    s.pneumatic_supply += wanted
+
+
+@inlined
+def corrected(par, s, then, x):
+    """What was foretold, with the work that a way which is not quite as foretold makes of it."""
+    gas, off = then.gas, x - then.x
+    p_u = (RATIO - 1.0) * gas.energy_u / size_of_upper(par, then.x)
+    p_l = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, then.x)
+    up, down = p_u * par.pneumatic_upper_area * off, p_l * par.pneumatic_lower_area * off
+    gas = Gas(
+        gas.mass_u, gas.energy_u + up, gas.mass_l, gas.energy_l - down, gas.mass_x, gas.energy_x
+    )
+    force = up - down - outside(par) * (par.pneumatic_upper_area - par.pneumatic_lower_area) * off
+    return Ahead(gas, x, then.v, then.used, then.impulse, then.on_bit, then.work - force)
+
+
+@inlined
+def foretold(s):
+    """What was foretold for the end of the time."""
+    gas = Gas(
+        s.pneumatic_then_mass_u,
+        s.pneumatic_then_energy_u,
+        s.pneumatic_then_mass_l,
+        s.pneumatic_then_energy_l,
+        s.pneumatic_then_mass_x,
+        s.pneumatic_then_energy_x,
+    )
+    return Ahead(
+        gas,
+        s.pneumatic_then_x,
+        s.pneumatic_then_v,
+        s.pneumatic_then_used,
+        s.pneumatic_then_impulse,
+        s.pneumatic_then_on_bit,
+        s.pneumatic_then_work,
+    )
+
+
+@kernel
+def settle(par, s):
+    """Make out the gas on the way that was gone since it was foretold.
+
+    A bit that rings has a mean velocity by its way, in which the piston's own moves on.
+    """
+    h, x, before = s.pneumatic_since, -s.u_r, s.pneumatic_from_x
+    bit = (x - before) / h + 0.5 * (s.pneumatic_from_v + s.v_p)
+    then = foretold(s)
+    if abs(h - s.pneumatic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
+        then = corrected(par, s, then, x)
+    else:
+        way = Way(True, before, bit - s.pneumatic_from_v, x, bit - s.v_p, h)
+        y = Ahead(present_gas(s), before, 0.0, 0.0, 0.0, 0.0, 0.0)
+        then = go(par, s.pneumatic_supply, y, way)
+    keep_gas(par, s, then.gas)
+    feed_supply(par, s, then.used, h)
+    s.pneumatic_owed = then.impulse - s.pneumatic_given
+    s.pneumatic_owed_bit = then.on_bit - s.pneumatic_given_bit
+    s.pneumatic_given = s.pneumatic_given_bit = 0.0
+    s.pneumatic_consumed += then.used
+    s.pneumatic_gas_work += then.work
+    s.pneumatic_bit_velocity = bit
+    s.pneumatic_span = s.pneumatic_since = 0.0
+
+
+@kernel
+def foretell(par, s, span):
+    """Foretell the gas, and the forces that it will have."""
+    x, v, d = -s.u_r, s.pneumatic_bit_velocity - s.v_p, span
+    s.pneumatic_from_x, s.pneumatic_from_v = x, s.v_p
+    s.pneumatic_touched = s.closed
+    y = Ahead(present_gas(s), x, v, 0.0, 0.0, 0.0, 0.0)
+    then = go(par, s.pneumatic_supply, y, Way(s.closed == 1, x, 0.0, x, 0.0, span))
+    s.pneumatic_span, s.pneumatic_since = span, 0.0
+    s.pneumatic_then_mass_u, s.pneumatic_then_energy_u = then.gas.mass_u, then.gas.energy_u
+    s.pneumatic_then_mass_l, s.pneumatic_then_energy_l = then.gas.mass_l, then.gas.energy_l
+    s.pneumatic_then_mass_x, s.pneumatic_then_energy_x = then.gas.mass_x, then.gas.energy_x
+    s.pneumatic_then_x, s.pneumatic_then_v = then.x, s.pneumatic_bit_velocity - then.v
+    s.pneumatic_then_used, s.pneumatic_then_impulse = then.used, then.impulse
+    s.pneumatic_then_on_bit, s.pneumatic_then_work = then.on_bit, then.work
+    # a force that goes straight with the impulse and the way of the one foretold
+    impulse, slope = then.impulse, 0.0
+    if s.closed == 0:
+        moment = d * impulse + par.mass_p * (then.x - x - d * v + 0.5 * d * d * par.gravity)
+        slope = 12.0 * moment / (d * d * d) - 6.0 * impulse / (d * d)
+    s.pneumatic_slope = slope
+    s.pneumatic_base = (impulse + s.pneumatic_owed) / d - 0.5 * slope * d
+    s.pneumatic_mean_on_bit = (then.on_bit + s.pneumatic_owed_bit) / d
+
+
+@inlined
+def is_over(s):
+    """Whether the gas has to be foretold anew."""
+    since, span = s.pneumatic_since, s.pneumatic_span
+    if span == 0.0 or since >= (1.0 - 1e-9) * span or s.closed != s.pneumatic_touched:
+        return True
+    expected = s.pneumatic_from_v
+    if s.closed == 0:
+        expected += (s.pneumatic_then_v - expected) * since / span
+    return s.closed == 0 and abs(s.v_p - expected) > JUMP
+
+
+@kernel
+def renew(par, s, h):
+    """Foretell the gas where that is needed, for no less than a time."""
+    if not is_over(s):
+        return
+    if s.pneumatic_mass_u == 0.0:
+        begin(par, s)
+    elif s.pneumatic_since > 0.0:
+        settle(par, s)
+    foretell(par, s, h if h > 0.5 * AHEAD else AHEAD)
+
+
+@inlined
+def on_piston(par, s, h):
+    """Mean force on the piston over the next h [N]."""
+    renew(par, s, h)
+    return s.pneumatic_base + s.pneumatic_slope * (s.pneumatic_since + 0.5 * h)
+
+
+@inlined
+def on_bit(par, s, h):
+    """Mean force on the bit over the next h [N]."""
+    renew(par, s, h)
+    return s.pneumatic_mean_on_bit
+
+
+@inlined
+def pass_time(par, s, h):
+    """Note what was given for h."""
+    s.pneumatic_given += s.f_pneumatic_piston * h
+    s.pneumatic_given_bit += s.f_pneumatic_bit * h
+    s.pneumatic_held_work += s.f_pneumatic_piston * (s.u_r - s.pneumatic_last_u)
+    s.pneumatic_last_u = s.u_r
+    s.pneumatic_since += h
+    if -s.u_r > par.pneumatic_upper_exhaust_edge:
+        s.armed = 1
+
+
+@inlined
+def lasts(par, s):
+    """Time for which the forces that are held stay as they are [s]."""
+    return AHEAD
+
+
+@inlined
+def next_blow(par, s, period, kept, rest, push, climb):
+    """Air of the blow that has ended."""
+    used = s.pneumatic_consumed - s.pneumatic_consumed_before
+    s.pneumatic_air = used / max(period, LEAST_DIVISOR)
+    s.pneumatic_consumed_before = s.pneumatic_consumed
+
+
+_AREA, _PORT, _PLACE = (1e-6, 1.0), (0.0, 0.1), (0.0, 10.0)
+
+COMPONENT = Component(
+    "pneumatic",
+    "two chambers of air with ports that the piston opens, as of a down-the-hole hammer",
+    {
+        "supply_pressure": (24e5, "Pa", "pressure of the supply at the hammer, above that of the "
+                            "surroundings", 0.0, 1e8),
+        "supply_flow": (0.0, "kg/s", "most that the compressor gives; 0: as much as is needed",
+                        0.0, 1e3),
+        "supply_volume": (0.0, "m^3", "volume of the supply; 0: its pressure never falls", 0.0, 1e3),
+        "supply_temperature": (300.0, "K", "temperature of the supply", 100.0, 2000.0),
+        "ambient_pressure": (101325.0, "Pa", "pressure of the surroundings", 0.0, 1e7),
+        "ambient_temperature": (293.15, "K", "temperature of the surroundings", 100.0, 2000.0),
+        "back_pressure": (0.0, "Pa", "pressure in the hole above that of the surroundings", 0.0, 1e8),
+        "upper_area": (6.870e-3, "m^2", "A_u: area of the piston in the upper chamber", *_AREA),
+        "lower_area": (6.335e-3, "m^2", "A_l: the same in the lower chamber", *_AREA),
+        "upper_volume": (1.122e-3, "m^3", "upper chamber with the piston on the bit", 1e-9, 1.0),
+        "lower_volume": (0.271e-3, "m^3", "lower chamber with the piston on the bit", 1e-9, 1.0),
+        "exhaust_volume": (0.708e-3, "m^3", "volume between ports and flushing holes", 1e-9, 1.0),
+        "upper_exhaust_edge": (20.7e-3, "m", "L_5: the upper chamber is open to the exhaust below "
+                               "this distance of piston and bit", *_PLACE),
+        "lower_intake_edge": (36.2e-3, "m", "L_3: the lower one to the supply below it", *_PLACE),
+        "upper_intake_edge": (58.0e-3, "m", "L_4: the upper one to the supply above it", *_PLACE),
+        "lower_exhaust_edge": (82.4e-3, "m", "L_2: the lower one to the exhaust above it", *_PLACE),
+        "ramp": (6e-3, "m", "way over which a port opens", 1e-7, 1.0),
+        "upper_exhaust": (695e-6, "m^2", "area of the open port", *_PORT),
+        "lower_intake": (336e-6, "m^2", "area of the open port", *_PORT),
+        "upper_intake": (569e-6, "m^2", "area of the open port", *_PORT),
+        "lower_exhaust": (1907e-6, "m^2", "area of the open port", *_PORT),
+        "flushing": (1658e-6, "m^2", "area of the flushing holes", *_PORT),
+        "bypass": (3.2e-6, "m^2", "area from the supply to the exhaust volume", *_PORT),
+        "leak": (2.419e-6, "m^2", "area of the leak beside each port, and between the chambers",
+                 *_PORT),
+        "discharge": (0.7, "-", "C_d: discharge coefficient of all areas", 0.0, 1.0),
+        "friction": (24.19, "N", "friction of the piston", 0.0, 1e6),
+        "wall_conductance": (0.0, "W/K", "heat that passes the walls of a chamber", 0.0, 1e6),
+        "wall_temperature": (293.15, "K", "temperature of the walls", 100.0, 2000.0),
+    },
+    on_piston=on_piston,
+    on_bit=on_bit,
+    is_drive=True,
+    lasts=lasts,
+    state={
+        "upper_pressure": ("Pa", "pressure of the upper chamber", 0.0),
+        "lower_pressure": ("Pa", "pressure of the lower chamber", 0.0),
+        "exhaust_pressure": ("Pa", "pressure behind the flushing holes", 0.0),
+        "supply": ("Pa", "pressure of the supply", 0.0),
+        "air": ("kg/s", "air that the last blow consumed, by its period", 0.0),
+        "consumed": ("kg", "air consumed since the start", 0.0),
+        "gas_work": ("J", "work of the gas on the piston, relative to the bit, by the gas", 0.0),
+        "held_work": ("J", "the same by the forces that solvers took", 0.0),
+    },
+    hidden=(
+        *(f"{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
+        *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
+        "then_x", "then_v", "then_used", "then_impulse", "then_on_bit", "then_work",
+        "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope", "mean_on_bit",
+        "given", "given_bit", "owed", "owed_bit", "last_u", "consumed_before",
+    ),
+    pass_time=pass_time,
+    inputs=("supply_pressure", "supply_flow"),
+    next_blow=next_blow,
+    of_blow=("air",),
+)  # fmt: skip

@@ -1,0 +1,107 @@
+"""Air as an ideal gas: flow through orifices, and volumes with mass and energy as their state.
+
+With mass and energy as state the balances of a volume are linear in what flows, so that any
+Runge-Kutta step keeps them to rounding (docs/model.md, eqs 30-32).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from percussion_model.physics.kernel import inlined
+
+# Gas constant of air [J/(kg K)], and the ratio of its specific heats.
+AIR, RATIO = 287.05, 1.4
+# Specific heat at constant pressure [J/(kg K)].
+HEAT = AIR * RATIO / (RATIO - 1.0)
+# Flow below this ratio of pressures is choked, and has the flow function of this ratio.
+CRITICAL = (2.0 / (RATIO + 1.0)) ** (RATIO / (RATIO - 1.0))
+CHOKED = math.sqrt(RATIO) * (2.0 / (RATIO + 1.0)) ** (0.5 * (RATIO + 1.0) / (RATIO - 1.0))
+# Above this ratio the flow function goes straight to zero: its root would have no slope there.
+STRAIGHT = 0.999
+# r^(2/7) by powers of (r - MIDDLE)/HALF: Chebyshev's series, to 1e-12 from CRITICAL to 1.
+MIDDLE, HALF = 0.76, 0.24
+SERIES = (
+    0.9245847812874018,
+    0.08342118326375451,
+    -0.009408404117260575,
+    0.0016977574222590494,
+    -0.0003638052812686033,
+    8.534148874834725e-05,
+    -2.117444660507673e-05,
+    5.466412180421543e-06,
+    -1.4497868530582997e-06,
+    3.7924311762083114e-07,
+    -1.0349015013844109e-07,
+    3.9405551888194184e-08,
+    -1.1401584742998243e-08,
+)
+ROOT_7 = math.sqrt(7.0)
+
+
+@inlined
+def isentropic(r):
+    """Flow function of a ratio of pressures between `CRITICAL` and 1."""
+    t = (r - MIDDLE) / HALF
+    y = 0.0
+    for k in range(len(SERIES) - 1, -1, -1):
+        y = y * t + SERIES[k]
+    return ROOT_7 * y * y * math.sqrt(max(y * (1.0 - y), 0.0))
+
+
+AT_STRAIGHT = isentropic(STRAIGHT)
+
+
+@inlined
+def flow_function(r):
+    """Flow by area, pressure upstream and 1/sqrt(R T), for a ratio of pressures."""
+    if r <= CRITICAL:
+        return CHOKED
+    if r > STRAIGHT:
+        return AT_STRAIGHT * (1.0 - r) / (1.0 - STRAIGHT)
+    return isentropic(r)
+
+
+class Volume(NamedTuple):
+    """What orifices see of a volume of gas."""
+
+    pressure: float  # [Pa]
+    root: float  # sqrt(R T) [m/s]
+    enthalpy: float  # c_p T [J/kg]
+
+
+@inlined
+def volume_of(mass, energy, size):
+    """Look at a mass [kg] with an internal energy [J] in a volume [m^3]."""
+    heat = (RATIO - 1.0) * energy / mass  # R T
+    return Volume((RATIO - 1.0) * energy / size, math.sqrt(heat), RATIO * energy / mass)
+
+
+@inlined
+def reservoir(pressure, temperature):
+    """A volume so large that it stays as it is."""
+    return Volume(pressure, math.sqrt(AIR * temperature), HEAT * temperature)
+
+
+class Flow(NamedTuple):
+    """What goes through an orifice, from the first volume to the second."""
+
+    mass: float  # [kg/s]
+    energy: float  # enthalpy [W]
+
+
+@inlined
+def flow(one, other, area):
+    """Flow through an orifice of an effective area, C_d A [m^2]."""
+    if one.pressure >= other.pressure:
+        mass = area * one.pressure / one.root * flow_function(other.pressure / one.pressure)
+        return Flow(mass, mass * one.enthalpy)
+    mass = -area * other.pressure / other.root * flow_function(one.pressure / other.pressure)
+    return Flow(mass, mass * other.enthalpy)
+
+
+@inlined
+def relaxation(root, area, size):
+    """Greatest rate at which a volume comes to a pressure through an effective area [1/s]."""
+    return RATIO * root * area * AT_STRAIGHT / ((1.0 - STRAIGHT) * size)
