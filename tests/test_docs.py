@@ -133,7 +133,7 @@ MADE = (
     *("docs/parameters.md", "docs/reference/outputs.md", "docs/reference/command_line.md"),
     *("docs/data/fmu_interface.md", "docs/data/system_variables.md", "docs/data/hard_cases.md"),
     *("docs/data/paper_statements.md", "docs/data/coupling_step.md"),
-    *("docs/data/step_rejection.md", "docs/rocks.md"),
+    *("docs/data/step_rejection.md", "docs/rocks.md", "docs/data/hammers.md"),
 )
 
 

@@ -57,6 +57,8 @@ def shown(capsys, tmp_path, monkeypatch):
         ["explain", REFERENCE],
         ["rocks"],
         ["rocks", "kuru-granite:10"],
+        ["hammers"],
+        ["hammers", "sandvik-4-inch"],
         ["explain", str(ROOT / "scenarios" / "top_hammer.toml"), "--solver", "rigid"],
         ["effects", RIGID, *SHORT, "--no-figures"],
         [

@@ -36,6 +36,7 @@ from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
 from percussion_model.interface.commands.effects import effects
 from percussion_model.interface.commands.explore import explore
+from percussion_model.interface.commands.hammers import hammers
 from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.rocks import rocks
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
@@ -171,6 +172,7 @@ for _command in (
     new,
     rocks,
     bits,
+    hammers,
 ):
     add(_command)
 add(explore, waits=True)

@@ -95,6 +95,17 @@ def print_table(
         console.print(Text(lines), soft_wrap=True)
 
 
+def print_stored(
+    headings: Sequence[str], left: Collection[str], rows: Iterable[Sequence[str]], note: str
+) -> None:
+    """Print the table of all that is stored of a kind, and what its words mean."""
+    table = airy_table(headings, left, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    print_table(table)
+    print_notes(["", note])
+
+
 def _size(column: Column, wide: Console) -> Size:
     found = [wide.measure(cell) for cell in (column.header, *column.cells)]
     most = max(one.maximum for one in found)

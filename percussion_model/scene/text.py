@@ -7,13 +7,13 @@ import os
 import re
 import sys
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table, rows_by_key
-from percussion_model.scene.rows import ParameterRow, SceneError, shortened, toml_value
+from percussion_model.scene.rows import ParameterRow, SceneError, said_among, shortened, toml_value
 from percussion_model.scene.units import has_unit, with_point
 from percussion_model.scene.writing import write_whole
 
@@ -36,6 +36,21 @@ _HEADER = (
     "# forces on contact and rock are positive in compression. What is left out takes",
     "# its default, which is the value of the reference scene.",
 )
+
+
+def read_stored(what: str, name: str, names: Collection[str], folder: Path) -> dict[str, Any]:
+    """Read what is stored under a name in a folder: a bit, a rock, a hammer.
+
+    Raises
+    ------
+    SceneError
+        If there is none of that name.
+    """
+    if name not in names:
+        raise SceneError(
+            f"{what} {shortened(name)}: there is none of that name: {said_among(name, names)}"
+        )
+    return read_toml(folder / f"{name}.toml")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

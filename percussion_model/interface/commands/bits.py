@@ -33,7 +33,7 @@ def bits(
     json_file: common.JsonFile = None,
 ) -> None:
     """List the button bits that --bit takes: diameter, buttons, sources; or tell of one."""
-    from percussion_model.interface.tables import airy_table, named_table, print_notes, print_table
+    from percussion_model.interface.tables import named_table, print_stored, print_table
     from percussion_model.scene.bits import bit
     from percussion_model.scene.bits import bits as names
 
@@ -44,19 +44,16 @@ def bits(
     )
     if json_file == "-":
         return
-    if name is not None:
+    if name is None:
+        print_stored(HEADINGS, HEADINGS[:1], map(cells, chosen), NOTE)
+    else:
         print_table(named_table(details(chosen[0]), chosen[0].title))
-        return
-    table = airy_table(HEADINGS, HEADINGS[:1], pad_edge=False)
-    for one in chosen:
-        table.add_row(*cells(one))
-    print_table(table)
-    print_notes(["", NOTE])
 
 
-def _interval(one: Number, scale: float = 1.0) -> str:
-    value, low, high = (f"{scale * number:.3g}" for number in (one.value, one.low, one.high))
-    return f"{value} ({low} to {high})"
+def interval_text(one: Number, scale: float = 1.0, digits: int = 3) -> str:
+    """Return a number, and its interval where it has one, times a scale."""
+    value, low, high = (f"{scale * v:.{digits}g}" for v in (one.value, one.low, one.high))
+    return value if one.low == one.high else f"{value} ({low} to {high})"
 
 
 def _sizes(one: ButtonBit) -> str:
@@ -68,18 +65,18 @@ def _sizes(one: ButtonBit) -> str:
 def cells(one: ButtonBit) -> tuple[str, ...]:
     """Return the texts of a row, by `HEADINGS`."""
     return (
-        one.name, f"{MM * one.diameter:g}", _interval(one.buttons), str(one.gauge_buttons),
-        _sizes(one), _interval(one.mean_radius, MM), f"{RPM * one.usual_speed:.0f}",
+        one.name, f"{MM * one.diameter:g}", interval_text(one.buttons), str(one.gauge_buttons),
+        _sizes(one), interval_text(one.mean_radius, MM), f"{RPM * one.usual_speed:.0f}",
     )  # fmt: skip
 
 
 def details(one: ButtonBit) -> Iterable[tuple[str, str]]:
     """Go through all that is known of a bit, as names and texts."""
     yield "Diameter", f"{MM * one.diameter:g} mm"
-    yield "Buttons", f"{_interval(one.buttons)}, {one.gauge_buttons} of them on the gauge"
+    yield "Buttons", f"{interval_text(one.buttons)}, {one.gauge_buttons} of them on the gauge"
     yield "Why", one.buttons.why
     yield "Button diameter", f"{_sizes(one)} mm"
-    yield "Mean radius", f"{_interval(one.mean_radius, MM)} mm: {one.mean_radius.why}"
+    yield "Mean radius", f"{interval_text(one.mean_radius, MM)} mm: {one.mean_radius.why}"
     yield "Rotation by rule", f"{RPM * one.usual_speed:.0f} rpm"
     yield "Source", one.source["cited"]
     yield "Read in", one.source["read_in"]

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.scene.rocks import Number
-from percussion_model.scene.rows import SceneError, said_among, shortened
 from percussion_model.scene.scene import Scene
-from percussion_model.scene.text import read_toml
+from percussion_model.scene.text import read_stored
 
 _HERE = Path(__file__).parent
 # Revolutions in a minute are this divided by the diameter in inches (a maker's rule for
@@ -109,11 +108,7 @@ def bit(name: str) -> ButtonBit:
     SceneError
         If there is none of that name.
     """
-    if name not in bits():
-        raise SceneError(
-            f"bit {shortened(name)}: there is none of that name: {said_among(name, bits())}"
-        )
-    tree = read_toml(_HERE / f"{name}.toml")
+    tree = read_stored("bit", name, bits(), _HERE)
     counted = {key: Number(key, **tree.pop(key)) for key in ("buttons", "mean_radius")}
     return ButtonBit(name, **{**tree, **counted})
 

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from percussion_model.scene.rows import SceneError, said_among, shortened
-from percussion_model.scene.text import read_toml
+from percussion_model.scene.rows import SceneError, shortened
+from percussion_model.scene.text import read_stored
 
 _HERE = Path(__file__).parent
 # More buttons than any bit has.
@@ -153,10 +153,6 @@ def rock(name: str, buttons: int | None = None) -> Rock:
     SceneError
         If there is no such rock, or it cannot be had for so many buttons.
     """
-    if name not in _names():
-        raise SceneError(
-            f"rock {shortened(name)}: there is none of that name: {said_among(name, rocks())}"
-        )
     found = _read(name)
     return found if buttons is None else found.of_buttons(buttons)
 
@@ -184,7 +180,7 @@ def read_rock(text: str) -> Rock:
 @cache
 def _read(name: str) -> Rock:
     """Rock of a file; these files are our own, and a test reads them all."""
-    tree = read_toml(_HERE / f"{name}.toml")
+    tree = read_stored("rock", name, rocks(), _HERE)
     numbers, breaking = (
         tuple(Number(key, **one) for key, one in tree.get(part, {}).items())
         for part in ("parameters", "craters")
