@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from percussion_model.physics.kernel import inlined
+from percussion_model.physics.kernel import inlined, kernel
 
 # Gas constant of air [J/(kg K)], and the ratio of its specific heats.
 AIR, RATIO = 287.05, 1.4
@@ -89,19 +89,18 @@ class Flow(NamedTuple):
 
     mass: float  # [kg/s]
     energy: float  # enthalpy [W]
+    stiffness: float  # bound of what either volume changes by its pressure in a second [m^3/s]
 
 
-@inlined
+@kernel
 def flow(one, other, area):
     """Flow through an orifice of an effective area, C_d A [m^2]."""
-    if one.pressure >= other.pressure:
-        mass = area * one.pressure / one.root * flow_function(other.pressure / one.pressure)
-        return Flow(mass, mass * one.enthalpy)
-    mass = -area * other.pressure / other.root * flow_function(one.pressure / other.pressure)
-    return Flow(mass, mass * other.enthalpy)
-
-
-@inlined
-def relaxation(root, area, size):
-    """Greatest rate at which a volume comes to a pressure through an effective area [1/s]."""
-    return RATIO * root * area * AT_STRAIGHT / ((1.0 - STRAIGHT) * size)
+    high, low, sign = one, other, 1.0
+    if one.pressure < other.pressure:
+        high, low, sign = other, one, -1.0
+    r = low.pressure / high.pressure
+    by_area = flow_function(r) * area
+    mass = sign * by_area * high.pressure / high.root
+    # the secant to equal pressures, steeper than the flow function
+    stiffness = RATIO * high.root * by_area / max(1.0 - r, 1.0 - STRAIGHT)
+    return Flow(mass, mass * high.enthalpy, stiffness)
