@@ -316,21 +316,22 @@ def foretold(s):
 def settle(par, s):
     """Make out the gas on the way that was gone since it was foretold.
 
-    A bit that rings has a mean velocity by its way, in which the piston's own moves on.
+    A bit that rings has a mean velocity by its way, in which the piston's own moves on. The
+    piston's last is that before it met something.
     """
-    h, x, before = s.pneumatic_since, -s.u_r, s.pneumatic_from_x
-    bit = (x - before) / h + 0.5 * (s.pneumatic_from_v + s.v_p)
+    h, x, before, v_p = s.pneumatic_since, -s.u_r, s.pneumatic_from_x, s.pneumatic_last_v
+    bit = (x - before) / h + 0.5 * (s.pneumatic_from_v + v_p)
     then = foretold(s)
     if abs(h - s.pneumatic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
         then = corrected(par, s, then, x)
     else:
-        way = Way(True, before, bit - s.pneumatic_from_v, x, bit - s.v_p, h)
+        way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h)
         y = Ahead(present_gas(s), before, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         then = go(par, s.pneumatic_supply, y, way)
     keep_gas(par, s, then.gas)
     feed_supply(par, s, then.used, h)
-    s.pneumatic_owed = then.impulse - s.pneumatic_given
-    s.pneumatic_owed_bit = then.on_bit - s.pneumatic_given_bit
+    s.pneumatic_owed += then.impulse - s.pneumatic_given
+    s.pneumatic_owed_bit += then.on_bit - s.pneumatic_given_bit
     s.pneumatic_given = s.pneumatic_given_bit = 0.0
     s.pneumatic_consumed += then.used
     s.pneumatic_gas_work += then.work
@@ -407,7 +408,7 @@ def pass_time(par, s, h):
     s.pneumatic_given += s.f_pneumatic_piston * h
     s.pneumatic_given_bit += s.f_pneumatic_bit * h
     s.pneumatic_held_work += s.f_pneumatic_piston * (s.u_r - s.pneumatic_last_u)
-    s.pneumatic_last_u = s.u_r
+    s.pneumatic_last_u, s.pneumatic_last_v = s.u_r, s.v_p
     s.pneumatic_since += h
     if -s.u_r > par.pneumatic_upper_exhaust_edge:
         s.armed = 1
@@ -485,7 +486,7 @@ COMPONENT = Component(
         *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         "then_x", "then_v", "then_used", "then_impulse", "then_on_bit", "then_work",
         "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope", "mean_on_bit",
-        "given", "given_bit", "owed", "owed_bit", "last_u", "consumed_before",
+        "given", "given_bit", "owed", "owed_bit", "last_u", "last_v", "consumed_before",
     ),
     pass_time=pass_time,
     inputs=("supply_pressure", "supply_flow"),
