@@ -335,6 +335,7 @@ def settle(par, s):
     s.pneumatic_given = s.pneumatic_given_bit = 0.0
     s.pneumatic_consumed += then.used
     s.pneumatic_gas_work += then.work
+    s.pneumatic_held_work = s.pneumatic_given_work
     s.pneumatic_bit_velocity = bit
     s.pneumatic_span = s.pneumatic_since = 0.0
 
@@ -407,7 +408,7 @@ def pass_time(par, s, h):
     """Note what was given for h."""
     s.pneumatic_given += s.f_pneumatic_piston * h
     s.pneumatic_given_bit += s.f_pneumatic_bit * h
-    s.pneumatic_held_work += s.f_pneumatic_piston * (s.u_r - s.pneumatic_last_u)
+    s.pneumatic_given_work += s.f_pneumatic_piston * (s.u_r - s.pneumatic_last_u)
     s.pneumatic_last_u, s.pneumatic_last_v = s.u_r, s.v_p
     s.pneumatic_since += h
     if -s.u_r > par.pneumatic_upper_exhaust_edge:
@@ -486,7 +487,7 @@ COMPONENT = Component(
         *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         "then_x", "then_v", "then_used", "then_impulse", "then_on_bit", "then_work",
         "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope", "mean_on_bit",
-        "given", "given_bit", "owed", "owed_bit", "last_u", "last_v", "consumed_before",
+        "given", "given_bit", "given_work", "owed", "owed_bit", "last_u", "last_v", "consumed_before",
     ),
     pass_time=pass_time,
     inputs=("supply_pressure", "supply_flow"),
