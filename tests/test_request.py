@@ -152,6 +152,7 @@ def judge(scene, requests, levels):
     return len(requests)
 
 
+@pytest.mark.slow
 def test_requests_are_met_on_scenes_drawn_by_seed(monkeypatch):
     """Finer runs end at 120 cells here, which only makes more of them end with a warning."""
     monkeypatch.setattr("percussion_model.simulation.accuracy_control.FINEST", 120)

@@ -61,6 +61,7 @@ def kuru():
     return load(["single_insert_kuru"])[0]
 
 
+@pytest.mark.slow
 def test_the_table_has_every_number_of_every_fit(found):
     rows = {(row.experiment, row.fit, row.id): row.role for row in found.rows}
     wanted = {
