@@ -38,7 +38,7 @@ from percussion_model.verification.measured.table import (
 from percussion_model.verification.rates import compare_rates
 from tests.commands import percussion
 
-# The search for chipping takes most of a minute, and each of two workers has the fits.
+# The search for chipping takes most of a minute.
 IS_LONG = "PERCUSSION_LONG" in os.environ
 BY_CHIPPING = "n = 1.5 and chipping at 115 kN, to 9, 11 and 13 m/s"
 STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
