@@ -197,6 +197,8 @@ def test(extra: list[str]) -> int:
             "NUMBA_CACHE_DIR": cache,
             "PERCUSSION_FMU_CACHE": str(Path(cache) / "percussion_fmu"),
             "MPLBACKEND": "Agg",
+            # threads of linear algebra would wait for each other: both cores have a process
+            "OPENBLAS_NUM_THREADS": "1",
         }
         with ThreadPoolExecutor(max_workers=1) as beside:  # the checks leave cores idle
             print("== kernels", flush=True)
@@ -209,7 +211,10 @@ def test(extra: list[str]) -> int:
             codes.append(kernels.result())
         # pytest comes last, so that its closing line ends the output; it tells how far it is.
         print("== pytest", flush=True)
-        codes.append(call([tool("pytest"), "-n", "2", *extra], **variables))
+        # a file stays with one process, which makes its fixtures once, and long files come first
+        whole = ["--dist", "loadfile", "--no-loadscope-reorder"]
+        shared = [] if "PERCUSSION_LONG" in os.environ else whole  # long trials are for all cores
+        codes.append(call([tool("pytest"), "-n", "2", *shared, *extra], **variables))
     return next((code for code in codes if code), 0)
 
 

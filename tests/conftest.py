@@ -32,6 +32,12 @@ os.environ.setdefault(
 )
 
 
+def pytest_collection_modifyitems(items):
+    """Files with slow tests come first, lest the last of them keep one process alone."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 @pytest.fixture(autouse=True)
 def no_progress(monkeypatch):
     """No lines of progress on stderr, however slow the machine; tests of them ask for more."""

@@ -185,6 +185,7 @@ def test_an_interval_over_the_whole_range_is_called_that():
     assert "nothing" not in note
 
 
+@pytest.mark.slow
 def test_intervals_of_a_curve_cover_as_often_as_they_say():
     """They hold together: the box that they span has the region of all parameters in it."""
     trials, confidence, both, halved = 60, 0.8, 0, 0

@@ -145,6 +145,7 @@ def trial(folder, seed, cells, samples, law="bilinear"):
     return truth, fit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SUITE[2] if LONG else SUITE[2][::3])
 def test_rocks_that_are_known_are_found_again(seed, tmp_path):
     """Each trial is a test, so that processors share them: all intervals must cover."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 import percussion_model
 from percussion_model.interface.cli import main
@@ -20,8 +22,18 @@ RUN = ["run", SCENE, *SHORT]
 
 @pytest.fixture
 def percussion(monkeypatch, tmp_path, capsys):
-    """The command, in a folder of its own: gives its code and what it said on stderr."""
+    """The command, in a folder of its own: gives its code and what it said on stderr.
+
+    Figures are files with a number, another one each time, which tells of one drawn anew.
+    """
     monkeypatch.chdir(tmp_path)
+    drawn = itertools.count()
+
+    def savefig(figure, path, **options):
+        Path(path).write_text(f"<svg>{next(drawn)}</svg>")
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
+    monkeypatch.setattr(Figure, "draw_without_rendering", lambda figure: None)
 
     def call(*words):
         monkeypatch.setattr("sys.argv", ["percussion", *map(str, words)])

@@ -32,6 +32,7 @@ def site(tmp_path_factory):
     return folder / "html"
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning(site):
     assert (site / "index.html").is_file()
 

@@ -41,6 +41,7 @@ def do(page, folder):
             assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(page.stem for page in FOLDER.glob("*.md")))
 def test_a_tutorial_ends_with_its_figure(name, tmp_path):
     page = FOLDER / f"{name}.md"

@@ -38,7 +38,7 @@ from percussion_model.verification.measured.table import (
 from percussion_model.verification.rates import compare_rates
 from tests.commands import percussion
 
-# The search for chipping takes most of a minute, and each of two workers has the fits.
+# The search for chipping takes most of a minute.
 IS_LONG = "PERCUSSION_LONG" in os.environ
 BY_CHIPPING = "n = 1.5 and chipping at 115 kN, to 9, 11 and 13 m/s"
 STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
@@ -61,6 +61,7 @@ def kuru():
     return load(["single_insert_kuru"])[0]
 
 
+@pytest.mark.slow
 def test_the_table_has_every_number_of_every_fit(found):
     rows = {(row.experiment, row.fit, row.id): row.role for row in found.rows}
     wanted = {

@@ -137,6 +137,7 @@ def test_users_get_no_tools_of_development(wheel):
         assert not any(text.startswith(tool) for text in of_all)
 
 
+@pytest.mark.slow
 def test_scenes_are_found_by_name(installed):
     out = installed.percussion("run", "rigid", "--duration", "0.5", "--settle", "0.1",
                                "--json", "-")  # fmt: skip

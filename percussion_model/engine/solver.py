@@ -6,6 +6,7 @@ import ctypes
 import math
 import threading
 import weakref
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -142,8 +143,6 @@ class EngineSolver(Solver):
     ----------
     time_step : float or None
         Longest step [s].
-    cells : dict of int
-        Modes, cells or elements of each elastic bar, by its name.
     PAR, STATE : dtype
         Of its parameters, and of its state's record.
     """
@@ -175,7 +174,6 @@ class EngineSolver(Solver):
         self._names = self._elastic_bars()
         self._grids: dict[str, Grid] = {}
         self._shapes: dict[tuple[str, int], np.ndarray] = {}
-        self.cells = self._count_cells()
         self._facts = np.zeros(FACTS)
         # what `sample` works in
         self._spare = State(self.STATE, self._array_shapes, RECORD)
@@ -218,7 +216,10 @@ class EngineSolver(Solver):
         piston = ["piston"] * (self.scene.piston.model == "elastic")
         return [*piston, "bit"]
 
-    def _count_cells(self) -> dict[str, int]:
+    # counted when asked for: of many rods that takes as long as a blow
+    @cached_property
+    def cells(self) -> dict[str, int]:
+        """As in `Solver`."""
         return {name: self._grid(name).n for name in self._names}
 
     def _grid(self, name: str) -> Grid:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -35,8 +36,14 @@ class ModalSolver(EngineSolver):
     PAR, STATE = MODAL_PAR, MODAL_STATE
     COUNTS: ClassVar = ("steps", "leaps", "events", "blows", "locked")
 
-    def _count_cells(self) -> dict[str, int]:
-        self.modes = asked_modes(numbers_of(self.scene))
+    @cached_property
+    def modes(self) -> int:
+        """Modes that the scene asks for, or its wanted accuracy."""
+        return asked_modes(numbers_of(self.scene))
+
+    @cached_property
+    def cells(self) -> dict[str, int]:
+        """Modes of each elastic bar, by its name."""
         of_forms = self._motion.array(SIZES_ROW, 1, np.int64)
         counts = {"piston": self._array_shapes[1][1], "bit": int(of_forms[0])}
         return {name: counts[name] for name in self._names}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 from importlib import import_module
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
@@ -49,8 +50,6 @@ class Solver(ABC):
     time_step : float or None
         Distance of grid points [s]; None where there are none. A solver that has it
         counts its steps.
-    cells : dict of int
-        Modes, cells or elements of each elastic bar, by its name.
     wave_speed_error : float
         Largest relative error of a section's wave speed.
     operator_bytes : int
@@ -67,10 +66,14 @@ class Solver(ABC):
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.cells: dict[str, int] = {}
         self._no_blows = np.zeros(1, BLOW)
         self._no_events = np.zeros(1, EVENT)
         self._no_reading = np.zeros(1, READING)
+
+    @cached_property
+    def cells(self) -> dict[str, int]:
+        """Modes, cells or elements of each elastic bar, by its name."""
+        return {}
 
     # what every solver gives
 

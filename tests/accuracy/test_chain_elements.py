@@ -145,6 +145,7 @@ def check(scene: Scene) -> None:
     assert rms[1] < 0.45 * rms[0], (coarse, fine)
 
 
+@pytest.mark.slow
 def test_loss_of_the_ends_themselves():
     """Of ten times the loss, ends of the impedance Z would miss 1e-3 of the work on the rock."""
     fine = errors(chain_of({"joint": "perfect"}, loss={"time": 10.0 * LOSS_TIME}))[-1]

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -245,17 +244,28 @@ def test_interrupted_scenarios_say_so(scenario, hammer, monkeypatch):
     assert said == "scenarios.pressure_loss: interrupted before there was a result\n"
 
 
+# What `python -m` does, with one start for both calls.
+BOTH = """
+import runpy, sys
+name = sys.argv.pop()
+for word in ("--help", "none.there"):
+    sys.argv[1:] = [word]
+    try:
+        runpy.run_module(name, run_name="__main__", alter_sys=True)
+    except SystemExit as ended:
+        print(word, "ended with", ended.code)
+"""
+
+
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_every_scenario_has_the_same_words(name, tmp_path):
     """As a person types them, with the clone on the path."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-    call = partial(subprocess.run, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    command = [sys.executable, "-m", f"scenarios.{name}"]
-    helped = call([*command, "--help"])
-    assert helped.returncode == 0
+    command = [sys.executable, "-c", BOTH, f"scenarios.{name}"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     for word in (f"python -m scenarios.{name}", "--out DIR", f"out/scenarios/{name}", "--force"):
-        assert word in helped.stdout
-    refused = call([*command, "none.there"])
-    assert refused.returncode == BAD_INPUT
-    assert refused.stderr == f"scenarios.{name}: none.there: no such file\n"
+        assert word in done.stdout
+    ends = f"--help ended with 0\nnone.there ended with {BAD_INPUT}\n"
+    assert done.stdout.endswith(ends)
+    assert done.stderr == f"scenarios.{name}: none.there: no such file\n"
     assert list(tmp_path.iterdir()) == []

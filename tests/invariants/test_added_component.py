@@ -210,6 +210,7 @@ def run(tmp_path_factory):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", COARSE)
 def test_a_drag_on_the_bit(run, solver):
     damping = 2e3  # [N s/m]

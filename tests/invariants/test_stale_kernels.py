@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import percussion_model
 
 # The force of the drive as a kernel of each solver sees it: 7 N from outside, masses of 1 kg.
@@ -48,6 +50,7 @@ print(json.dumps(found))
 """
 
 
+@pytest.mark.slow
 def test_every_solver_sees_an_edit_of_a_function_that_its_kernels_call(tmp_path):
     source = Path(percussion_model.__file__).parent
     package = tmp_path / source.name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from functools import partial
+from functools import cache, partial
 
 import pytest
 
@@ -46,7 +46,12 @@ def make():
 @pytest.fixture
 def points(feed_control, brief):
     """Points of the PI on `soft`, from an instance of its own."""
-    return bench(feed_control, make, trials=ALONE, check_step=False)[0].points
+    return points_alone(feed_control)
+
+
+@cache
+def points_alone(system):
+    return bench(system, make, trials=ALONE, check_step=False)[0].points
 
 
 @pytest.mark.parametrize(
