@@ -66,6 +66,8 @@ class Component(NamedTuple):
     lasts : kernel or None
         lasts(par, s) -> time for which its mean forces may be taken as constant [s]. Without
         it modes make no leaps.
+    slope : kernel or None
+        slope(par, s) -> how fast the force on the piston changes while it lasts [N/s].
     hidden : tuple of str
         Further fields of the state, which start at 0 and are no columns.
     """
@@ -87,6 +89,7 @@ class Component(NamedTuple):
     needs: Mapping[str, tuple[Any, ...]] = _NOTHING
     is_drive: bool = False
     lasts: Callable[..., float] | None = None
+    slope: Callable[..., float] | None = None
     hidden: tuple[str, ...] = ()
 
     @property

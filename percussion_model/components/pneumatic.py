@@ -29,6 +29,8 @@ from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # The gas is foretold for so long [s]; an integration takes no longer steps than the second.
 AHEAD, LONGEST = 2e-4, 2e-4
+# Forces that are asked for less than half of this time are those of a longer one [s].
+SHORTEST = 2e-5
 # Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
 STABLE = 1.5
 # Where the stages of a step are, and their shares of it.
@@ -41,6 +43,8 @@ LEAST_SHARE = 1e-4
 NEAR = 1e-5
 # A piston that is faster or slower by this than was foretold has met something [m/s].
 JUMP = 1.0
+# A bit that bounces comes to the piston no faster than this [m/s].
+BOUNCE = 10.0
 # Friction has its full value from some times this speed on [m/s].
 CREEP = 1e-2
 
@@ -258,7 +262,6 @@ def begin(par, s):
     u, low, behind = size_of_upper(par, x), size_of_lower(par, x), par.pneumatic_exhaust_volume
     keep_gas(par, s, Gas(p * u, q * u, p * low, q * low, p * behind, q * behind))
     s.pneumatic_supply = set_pressure(par, s)
-    s.pneumatic_last_u = s.u_r
 
 
 @inlined
@@ -345,9 +348,10 @@ def foretell(par, s, span):
     """Foretell the gas, and the forces that it will have."""
     x, v, d = -s.u_r, s.pneumatic_bit_velocity - s.v_p, span
     s.pneumatic_from_x, s.pneumatic_from_v = x, s.v_p
-    s.pneumatic_touched = s.closed
+    s.pneumatic_touched, s.pneumatic_last_u = s.closed, s.u_r
     y = Ahead(present_gas(s), x, v, 0.0, 0.0, 0.0, 0.0, 0.0)
-    then = go(par, s.pneumatic_supply, y, Way(s.closed == 1, x, 0.0, x, 0.0, span))
+    u = s.v_b - s.v_p  # at which a piston that touches the bit goes on
+    then = go(par, s.pneumatic_supply, y, Way(s.closed == 1, x, u, x + u * d, u, d))
     s.pneumatic_span, s.pneumatic_since = span, 0.0
     s.pneumatic_then_mass_u, s.pneumatic_then_energy_u = then.gas.mass_u, then.gas.energy_u
     s.pneumatic_then_mass_l, s.pneumatic_then_energy_l = then.gas.mass_l, then.gas.energy_l
@@ -377,6 +381,14 @@ def is_over(s):
     return s.closed == 0 and abs(s.v_p - expected) > JUMP
 
 
+@inlined
+def lasts(par, s):
+    """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
+    if s.closed == 1:
+        return SHORTEST
+    return min(max(-s.u_r / max(s.v_p - s.v_b, BOUNCE), SHORTEST), AHEAD)
+
+
 @kernel
 def renew(par, s, h):
     """Foretell the gas where that is needed, for no less than a time."""
@@ -386,7 +398,7 @@ def renew(par, s, h):
         begin(par, s)
     elif s.pneumatic_since > 0.0:
         settle(par, s)
-    foretell(par, s, h if h > 0.5 * AHEAD else AHEAD)
+    foretell(par, s, h if h >= 0.5 * SHORTEST else lasts(par, s))
 
 
 @inlined
@@ -416,9 +428,9 @@ def pass_time(par, s, h):
 
 
 @inlined
-def lasts(par, s):
-    """Time for which the forces that are held stay as they are [s]."""
-    return AHEAD
+def slope(par, s):
+    """How fast the force on the piston changes [N/s]."""
+    return s.pneumatic_slope
 
 
 @inlined
@@ -472,6 +484,7 @@ COMPONENT = Component(
     on_bit=on_bit,
     is_drive=True,
     lasts=lasts,
+    slope=slope,
     state={
         "upper_pressure": ("Pa", "pressure of the upper chamber", 0.0),
         "lower_pressure": ("Pa", "pressure of the lower chamber", 0.0),

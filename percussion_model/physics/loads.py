@@ -22,6 +22,23 @@ def _no_force(par: Any, s: Any, h: float) -> float:
     return 0.0
 
 
+def _and_slope(before: Callable, one: Component) -> Callable:
+    if one.slope is None:
+        return before
+    slope, present = one.slope, f"with_{one.name}"
+
+    @composed
+    def more(par: Any, s: Any) -> float:
+        return before(par, s) + slope(par, s) if par[present] == 1 else before(par, s)
+
+    return more
+
+
+@composed
+def _steady(par: Any, s: Any) -> float:
+    return 0.0
+
+
 def _and_drive(before: Callable, one: Component) -> Callable:
     if not (one.is_drive and one.on_bit):
         return before
@@ -128,6 +145,9 @@ pass_own_time = _joined(_nothing, _and_time)
 # note_drive(s, h): enter the impulse of drives on the bit.
 note_drive = _joined(_no_drive, _and_drive)
 
+# slope_on_piston(par, s): how fast the force on the piston changes while it is held [N/s].
+slope_on_piston = _joined(_steady, _and_slope)
+
 # lasting(par, s): time for which mean forces may be held [s].
 lasting = _joined(_always, _and_lasting)
 
@@ -146,6 +166,18 @@ def pass_time(par, s, h):
     if par.effects == 1:
         note_drive(s, h)
         pass_own_time(par, s, h)
+
+
+@inlined
+def bend_of(par, s, h, whole):
+    """Way that a piston is late or early by where a mean force is held for a changing one [m].
+
+    Parameters
+    ----------
+    h, whole : float
+        Time for which it was held, and that of which it is the mean [s].
+    """
+    return slope_on_piston(par, s) * h * h * (h / 6.0 - 0.25 * whole) / par.mass_p
 
 
 @inlined

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from percussion_model.physics.blows import FASTEST, end_with_blow, push_checkpoint
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.loads import (
+    bend_of,
     bit_acceleration,
     drive_force,
     hold_components,
@@ -114,9 +115,15 @@ def hold_on(par, s):
     if par.effects == 0:
         return LONGEST
     if s.time >= s.held_until:
+        if s.held_until > s.held_from and s.closed == 0:
+            whole = par.tick * (s.held_until - s.held_from)
+            way = bend_of(par, s, whole, whole)
+            s.u_p += way
+            s.u_r += way
+            s.gap -= way
         ticks = max(int(lasting(par, s) / par.tick), 1)
         hold_components(par, s, ticks * par.tick)
-        s.held_until = s.time + ticks
+        s.held_from, s.held_until = s.time, s.time + ticks
     return s.held_until - s.time
 
 

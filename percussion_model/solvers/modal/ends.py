@@ -373,7 +373,7 @@ def flip_contact(par, s, bars, approach, blows, events):
         close_gap(s, events, time, approach)
         join(par, s, bars)
     s.alert = 1
-    s.held_until = s.time
+    s.held_from = s.held_until = s.time
     s.look = s.time + LOOK * WHOLE
 
 

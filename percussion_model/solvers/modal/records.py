@@ -263,7 +263,8 @@ MODAL_STATE = np.dtype(
         ("piston_time", "i8"),
         ("no_park", "i8"),
         ("closed_at", "i8"),
-        ("held_until", "i8"),  # mean forces of components are held
+        ("held_from", "i8"),  # when mean forces of components were taken, and for how long they hold
+        ("held_until", "i8"),
         ("rest_until", "i8"),  # no front of a blow on a bit at rest can be at the rock before
         ("alert", "i8"),  # 1: standstill may end by the energy of the bit
         ("form", "i8"),
@@ -325,6 +326,7 @@ MODAL_LIMITS = Limits(
         "piston_time": COUNT,
         "no_park": COUNT,
         "closed_at": COUNT,
+        "held_from": COUNT,
         "held_until": COUNT,
         "rest_until": COUNT,
         "alert": FLAG,

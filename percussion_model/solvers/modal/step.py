@@ -266,7 +266,7 @@ def make(par, s, bars, level, trial, push, events):
 def load_bodies(par, s, bars, level):
     """Take the forces on the bodies over the next 2^level ticks."""
     hold_components(par, s, par.tick * (1 << level))
-    s.held_until = s.time
+    s.held_from = s.held_until = s.time
     a_p = piston_acceleration(par, drive_force(par, s)) if has_piston(par) else 0.0
     a_b = bit_acceleration(par, s)
     if a_p != s.a_p or a_b != s.a_b:
