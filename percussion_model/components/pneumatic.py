@@ -2,7 +2,7 @@
 
 The piston is x above the bit. Between its lower face and the bit is the lower chamber, above it
 the upper one; each fills from the supply and empties into the exhaust volume, from which flushing
-holes lead to the hole (docs/model.md, eqs 30 to 34). The force
+holes lead to the hole (docs/model.md, eqs 13a to 13c). The force
 
     F = p_u A_u - p_l A_l - p_b (A_u - A_l) + friction
 
@@ -27,10 +27,8 @@ from percussion_model.physics.gas import (
 )
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
-# The gas is foretold for so long [s]; an integration takes no longer steps than the second.
-AHEAD, LONGEST = 2e-4, 2e-4
-# Forces that are asked for less than half of this time are those of a longer one [s].
-SHORTEST = 2e-5
+# Where piston and bit touch, or may, gas is foretold for this share of the usual time.
+SHORTEST = 0.1
 # Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
 STABLE = 1.5
 # Where the stages of a step are, and their shares of it.
@@ -39,6 +37,8 @@ PARTS, SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.
 MOST_STEPS = 20_000
 # Of a chamber that a piston fills no less than this share of its volume is left.
 LEAST_SHARE = 1e-4
+# No volume is empty at the start [Pa].
+LEAST_PRESSURE = 100.0
 # A way foretold to this is the real one but for the work of the difference [m].
 NEAR = 1e-5
 # A piston that is faster or slower by this than was foretold has met something [m/s].
@@ -82,9 +82,8 @@ def size_of_upper(par, x):
 
 @inlined
 def size_of_lower(par, x):
-    """Volume of the lower chamber [m^3]."""
-    least = par.pneumatic_lower_volume
-    return max(least + par.pneumatic_lower_area * x, LEAST_SHARE * least)
+    """Volume of the lower chamber [m^3]; bars that are pressed together leave it as it is."""
+    return par.pneumatic_lower_volume + par.pneumatic_lower_area * max(x, 0.0)
 
 
 @inlined
@@ -126,6 +125,7 @@ def rates_of(par, supply, y):
     heat_u = wall * (cold - upper.root * upper.root / AIR)
     heat_l = wall * (cold - lower.root * lower.root / AIR)
     area_u, area_l = par.pneumatic_upper_area, par.pneumatic_lower_area
+    grow_l = area_l * v if x > 0.0 else 0.0
     grow_u = -area_u * v if area_u * x < (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume else 0.0
     rubbing = par.pneumatic_friction * v / math.sqrt(v * v + CREEP * CREEP)
     force = upper.pressure * area_u - lower.pressure * area_l
@@ -141,7 +141,7 @@ def rates_of(par, supply, y):
             to_lower.energy
             - from_lower.energy
             + across.energy
-            - lower.pressure * area_l * v
+            - lower.pressure * grow_l
             + heat_l,
             past.mass + from_upper.mass + from_lower.mass - out.mass,
             past.energy + from_upper.energy + from_lower.energy - out.energy,
@@ -212,7 +212,7 @@ def go(par, supply, y, way):
         for stage in range(4):
             rate = rates_of(par, supply, on_way(way, here, t + PARTS[stage] * h))
             if stage == 0:
-                h = left / math.ceil(left * max(1.0 / LONGEST, rate.rate / STABLE) - 1e-9)
+                h = left / math.ceil(left * max(1.0 / par.pneumatic_step, rate.rate / STABLE) - 1e-9)
             end = plus(end, rate, SHARES[stage] * h)
             here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
         t += h
@@ -258,7 +258,8 @@ def set_pressure(par, s):
 def begin(par, s):
     """Fill all volumes for the first time: with air of the surroundings, the supply's with its."""
     x, warm = -s.u_r, AIR * par.pneumatic_ambient_temperature
-    p, q = outside(par) / warm, outside(par) / (RATIO - 1.0)
+    pressure = max(outside(par), LEAST_PRESSURE)
+    p, q = pressure / warm, pressure / (RATIO - 1.0)
     u, low, behind = size_of_upper(par, x), size_of_lower(par, x), par.pneumatic_exhaust_volume
     keep_gas(par, s, Gas(p * u, q * u, p * low, q * low, p * behind, q * behind))
     s.pneumatic_supply = set_pressure(par, s)
@@ -285,8 +286,9 @@ def corrected(par, s, then, x):
     p_u = (RATIO - 1.0) * gas.energy_u / size_of_upper(par, then.x)
     p_l = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, then.x)
     up, down = p_u * par.pneumatic_upper_area * off, p_l * par.pneumatic_lower_area * off
+    given = p_l * (size_of_lower(par, x) - size_of_lower(par, then.x))
     gas = Gas(
-        gas.mass_u, gas.energy_u + up, gas.mass_l, gas.energy_l - down, gas.mass_x, gas.energy_x
+        gas.mass_u, gas.energy_u + up, gas.mass_l, gas.energy_l - given, gas.mass_x, gas.energy_x
     )
     force = up - down - outside(par) * (par.pneumatic_upper_area - par.pneumatic_lower_area) * off
     return Ahead(gas, x, then.v, then.used, then.impulse, then.on_bit, then.work - force, then.rate)
@@ -384,9 +386,8 @@ def is_over(s):
 @inlined
 def lasts(par, s):
     """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
-    if s.closed == 1:
-        return SHORTEST
-    return min(max(-s.u_r / max(s.v_p - s.v_b, BOUNCE), SHORTEST), AHEAD)
+    shortest, meet = SHORTEST * par.pneumatic_step, -s.u_r / max(s.v_p - s.v_b, BOUNCE)
+    return shortest if s.closed == 1 else min(max(meet, shortest), par.pneumatic_step)
 
 
 @kernel
@@ -398,7 +399,9 @@ def renew(par, s, h):
         begin(par, s)
     elif s.pneumatic_since > 0.0:
         settle(par, s)
-    foretell(par, s, h if h >= 0.5 * SHORTEST else lasts(par, s))
+    # what is asked for less is held on in steps
+    is_whole = h >= 0.5 * SHORTEST * par.pneumatic_step
+    foretell(par, s, h if is_whole else lasts(par, s))
 
 
 @inlined
@@ -477,6 +480,8 @@ COMPONENT = Component(
                  *_PORT),
         "discharge": (0.7, "-", "C_d: discharge coefficient of all areas", 0.0, 1.0),
         "friction": (24.19, "N", "friction of the piston", 0.0, 1e6),
+        "step": (1.5e-4, "s", "time for which the gas is foretold; shorter is more accurate",
+                 1e-7, 1e-3),
         "wall_conductance": (0.0, "W/K", "heat that passes the walls of a chamber", 0.0, 1e6),
         "wall_temperature": (293.15, "K", "temperature of the walls", 100.0, 2000.0),
     },

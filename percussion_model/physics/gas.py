@@ -1,7 +1,7 @@
 """Air as an ideal gas: flow through orifices, and volumes with mass and energy as their state.
 
 With mass and energy as state the balances of a volume are linear in what flows, so that any
-Runge-Kutta step keeps them to rounding (docs/model.md, eqs 30-32).
+Runge-Kutta step keeps them to rounding (docs/model.md, eqs 13a, 13b).
 """
 
 from __future__ import annotations

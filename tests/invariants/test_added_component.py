@@ -38,7 +38,7 @@ COMPONENT = Component(
     "drag",
     "viscous drag on the bit",
     {"damping": (0.0, "N s/m", "force by velocity", 0.0, 1e6)},
-    drag_force,
+    on_bit=drag_force,
 )
 '''
 
@@ -94,13 +94,12 @@ COMPONENT = Component(
         "first_time": (1e-3, "s", "in which the first chamber fills", 1e-6, 1e3),
         "second_time": (4e-4, "s", "in which the second chamber fills", 1e-6, 1e3),
     },
-    push,
-    "piston",
-    {
+    on_piston=push,
+    state={
         "first": ("Pa", "pressure of the first chamber", "start"),
         "second": ("Pa", "pressure of the second chamber", 0.0),
     },
-    fill,
+    pass_time=fill,
 )
 '''
 
@@ -145,7 +144,7 @@ COMPONENT = Component(
         "torque": (50.0, "N m", "that turns it", -1e6, 1e6),
         "lead": (0.1, "m", "torque divided by thrust", 1e-6, 1e3),
     },
-    thrust,
+    on_bit=thrust,
     state={
         "angle": ("rad", "angle that it has turned", 0.0),
         "speed": ("rad/s", "speed at which it turns", 0.0),
