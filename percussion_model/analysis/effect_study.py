@@ -126,7 +126,7 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
     """Go through the scene as it is, then one effect after the other."""
     effects = scene.effects
     yield Variant("", "as it is", no_penetration=_NO_CRUSHING if effects.rock == "spring" else "")
-    for name in ("gravity", "feed", *(one.name for one in COMPONENTS if not one.is_drive and _can_turn(scene, one))):
+    for name in ("gravity", "feed", *(one.name for one in COMPONENTS if _can_turn(scene, one))):
         yield _switched(name, getattr(effects, name))
     yield from _drive(scene)
     yield from _rock(scene)
@@ -140,8 +140,8 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
 
 def _can_turn(scene: Scene, one: Component) -> bool:
     """Whether a component can be turned: it is on, or acts and has all that it needs."""
-    if scene[f"effects.{one.name}"]:
-        return True
+    if one.is_drive or scene[f"effects.{one.name}"]:
+        return not one.is_drive
     acts = all(scene[key] in values for key, values in one.needs.items())
     needed = [name for name, (default, *_) in one.parameters.items() if default is None]
     known = [scene[f"{one.name}.{name}"] for name in needed]

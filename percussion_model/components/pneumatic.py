@@ -20,7 +20,6 @@ from percussion_model.components import Component
 from percussion_model.physics.gas import (
     AIR,
     RATIO,
-    Volume,
     flow,
     reservoir,
     volume_of,
@@ -103,7 +102,8 @@ def outside(par):
 def rates_of(par, supply, y):
     """What changes in a second; `x` and `v` as those of a free piston above a bit at rest."""
     gas, x, v = y.gas, y.x, y.v
-    size_u, size_l, size_x = size_of_upper(par, x), size_of_lower(par, x), par.pneumatic_exhaust_volume
+    size_u, size_l = size_of_upper(par, x), size_of_lower(par, x)
+    size_x = par.pneumatic_exhaust_volume
     upper = volume_of(gas.mass_u, gas.energy_u, size_u)
     lower = volume_of(gas.mass_l, gas.energy_l, size_l)
     behind = volume_of(gas.mass_x, gas.energy_x, size_x)
@@ -138,11 +138,7 @@ def rates_of(par, supply, y):
             to_upper.mass - from_upper.mass - across.mass,
             to_upper.energy - from_upper.energy - across.energy - upper.pressure * grow_u + heat_u,
             to_lower.mass - from_lower.mass + across.mass,
-            to_lower.energy
-            - from_lower.energy
-            + across.energy
-            - lower.pressure * grow_l
-            + heat_l,
+            to_lower.energy - from_lower.energy + across.energy - lower.pressure * grow_l + heat_l,
             past.mass + from_upper.mass + from_lower.mass - out.mass,
             past.energy + from_upper.energy + from_lower.energy - out.energy,
         ),
@@ -212,7 +208,8 @@ def go(par, supply, y, way):
         for stage in range(4):
             rate = rates_of(par, supply, on_way(way, here, t + PARTS[stage] * h))
             if stage == 0:
-                h = left / math.ceil(left * max(1.0 / par.pneumatic_step, rate.rate / STABLE) - 1e-9)
+                steps = left * max(1.0 / par.pneumatic_step, rate.rate / STABLE)
+                h = left / math.ceil(steps - 1e-9)
             end = plus(end, rate, SHARES[stage] * h)
             here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
         t += h
@@ -454,11 +451,13 @@ COMPONENT = Component(
                             "surroundings", 0.0, 1e8),
         "supply_flow": (0.0, "kg/s", "most that the compressor gives; 0: as much as is needed",
                         0.0, 1e3),
-        "supply_volume": (0.0, "m^3", "volume of the supply; 0: its pressure never falls", 0.0, 1e3),
+        "supply_volume": (0.0, "m^3", "volume of the supply; 0: its pressure never falls",
+                          0.0, 1e3),
         "supply_temperature": (300.0, "K", "temperature of the supply", 100.0, 2000.0),
         "ambient_pressure": (101325.0, "Pa", "pressure of the surroundings", 0.0, 1e7),
         "ambient_temperature": (293.15, "K", "temperature of the surroundings", 100.0, 2000.0),
-        "back_pressure": (0.0, "Pa", "pressure in the hole above that of the surroundings", 0.0, 1e8),
+        "back_pressure": (0.0, "Pa", "pressure in the hole above that of the surroundings",
+                          0.0, 1e8),
         "upper_area": (6.870e-3, "m^2", "A_u: area of the piston in the upper chamber", *_AREA),
         "lower_area": (6.335e-3, "m^2", "A_l: the same in the lower chamber", *_AREA),
         "upper_volume": (1.122e-3, "m^3", "upper chamber with the piston on the bit", 1e-9, 1.0),
@@ -504,8 +503,9 @@ COMPONENT = Component(
         *(f"{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         "then_x", "then_v", "then_used", "then_impulse", "then_on_bit", "then_work",
-        "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope", "mean_on_bit",
-        "given", "given_bit", "given_work", "owed", "owed_bit", "last_u", "last_v", "consumed_before",
+        "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope",
+        "mean_on_bit", "given", "given_bit", "given_work", "owed", "owed_bit", "last_u", "last_v",
+        "consumed_before",
     ),
     pass_time=pass_time,
     inputs=("supply_pressure", "supply_flow"),

@@ -58,6 +58,7 @@ SHOWN = (
     ("Peak bit force", "peak_bit_force", 1e-3, "kN"),
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
+    ("Free air (0 °C, 1 atm)", "pneumatic_air", 60.0 / 1.2923, "m³/min"),
 )
 # A smaller relative error of the wave speed is rounding.
 LEAST_MISFIT = 1e-6

@@ -16,7 +16,6 @@ from percussion_model.physics.kernel import composed, inlined, merged
 from percussion_model.physics.records import DriveKind, EventKind
 
 
-
 @composed
 def _no_force(par: Any, s: Any, h: float) -> float:
     return 0.0

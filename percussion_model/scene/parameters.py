@@ -474,7 +474,7 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
     if drives:
         row = plain.rows["drive"]
         known = "; ".join([row.description, *(f"{name}: {of}" for name, of in drives.items())])
-        switches["drive"] = choice(row.default, (*row.choices, *drives), known, row.needs)
+        switches["drive"] = choice(row.default, (*row.choices, *drives), known)
     if switches:
         groups["effects"] = _group("Effects", plain, plain.__doc__, switches)
     for key, group in groups.items():

@@ -35,6 +35,8 @@ MOST_WAVE_SPEED_ERROR = 1e-3
 # A rotation that is slower does not turn [rad/s].
 STANDING = 1e-2
 # Entries of the ledger that put energy in.
+# A supply below this share of what it is set to is starved.
+STARVED = 0.95
 _FLOWS = ("initial", "drive", "feed", "gravity")
 
 
@@ -138,6 +140,7 @@ def _about_blows(result: Result) -> Iterator[str]:
             "not known" * (count > 0) + "; run longer"
         )
     yield from _about_flight(result)
+    yield from _about_supply(result)
     rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
     if _stands(result):
         yield "the bit does not turn: it meets its own craters, and the hole does not advance"
@@ -146,6 +149,20 @@ def _about_blows(result: Result) -> Iterator[str]:
             f"blows do not repeat: the rate of penetration has a standard error of "
             f"{in_digits(100.0 * scatter / rate, 2)} %; a longer run.duration (--duration) "
             "averages more"
+        )
+
+
+def _about_supply(result: Result) -> Iterator[str]:
+    """Say that a hammer is starved of air."""
+    scene = result.scene
+    if scene.effects.drive != "pneumatic" or not result.end:
+        return
+    set_to = scene["pneumatic.supply_pressure"] + scene["pneumatic.ambient_pressure"]
+    found = result.end["pneumatic_supply"]
+    if found < STARVED * set_to:
+        yield (
+            f"the compressor gives too little air (pneumatic.supply_flow): the supply has fallen "
+            f"to {in_digits(found / 1e5)} bar, where {in_digits(set_to / 1e5)} bar are set"
         )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
 
+_SUPPLY = "pneumatic.supply_pressure"
 _NEW_TITLE = "A down-the-hole hammer"
 
 
@@ -233,6 +234,13 @@ def new(
     rods: Annotated[
         int | None, typer.Option("--rods", help="Rods of a top hammer, from 1 on; default 4.")
     ] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option(
+            "--pressure",
+            help="Air in the chambers of a down-the-hole hammer, at a pressure as '24 bar'.",
+        ),
+    ] = None,
     kind: Annotated[
         Literal["hammer", "hopkinson"],
         typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock."),
@@ -242,16 +250,21 @@ def new(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write a commented scene to start from: the reference hammer, or another."""
-    from percussion_model.scene.hammers import bar_test
+    from percussion_model.scene.hammers import bar_test, with_air
     from percussion_model.scene.hammers import hammer as find
+    from percussion_model.scene.parameters import read_number
     from percussion_model.scene.scene import Scene
 
     common.refuse_existing(file, force)
     common.check_file("FILE", file)
     if kind == "hopkinson":
-        if hammer is not None or rods is not None:
-            raise common.refusal("--kind hopkinson has no --hammer and no --rods")
+        if hammer is not None or rods is not None or pressure is not None:
+            raise common.refusal("--kind hopkinson has no --hammer, no --rods and no --pressure")
         scene = bar_test()
+    elif pressure is not None:
+        if hammer is None or rods is not None:
+            raise common.refusal("--pressure needs --hammer: one that works down the hole")
+        scene = with_air(hammer, read_number(_SUPPLY, pressure, "--pressure"))
     elif hammer is not None:
         scene = find(hammer, rods)
     elif rods is not None:

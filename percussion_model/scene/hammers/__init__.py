@@ -13,6 +13,13 @@ from percussion_model.scene.text import read_toml
 _HERE = Path(__file__).parent
 # A top hammer has so many rods where nothing else is asked for.
 USUAL_RODS = 4
+# Hammers with air in their chambers, and whose chambers of `chambers` these are, by size.
+CHAMBERS = {
+    "dth3": "sandvik-3-5-inch",
+    "dth4": "sandvik-4-inch",
+    "dth5": "sandvik-5-inch",
+    "dth6": "sandvik-6-inch",
+}
 
 
 def hammers() -> list[str]:
@@ -49,6 +56,34 @@ def hammer(name: str, rods: int | None = None) -> Scene:
     piston, shank, rod, bit = bars
     title = f"{tree['title']}: {count} of them" if count > 1 else f"{tree['title']}: one"
     return Scene(**{**tree, "title": title, "bars": [piston, shank, *[rod] * count, bit]})
+
+
+def with_air(name: str, pressure: float) -> Scene:
+    """Return the scene of a hammer that air drives, in chambers fitted to a catalogue.
+
+    Parameters
+    ----------
+    name : str
+        One of `CHAMBERS`.
+    pressure : float
+        Of the supply at the hammer, above that of the surroundings [Pa].
+
+    Raises
+    ------
+    SceneError
+        If the hammer has no chambers of air, or the pressure is out of bounds.
+    """
+    scene = hammer(name)
+    if name not in CHAMBERS:
+        raise SceneError(
+            f"hammer {name}: no chambers of air are known of it: there are those of "
+            f"{', '.join(CHAMBERS)}"
+        )
+    numbers = read_toml(_HERE / "chambers" / f"{CHAMBERS[name]}.toml")["pneumatic"]
+    changes = {f"pneumatic.{key}": value for key, value in numbers.items()}
+    changes["pneumatic.supply_pressure"] = pressure
+    law = {"drive.force": None, "drive.reversal_distance": None}
+    return scene.replace(**{"effects.drive": "pneumatic", **law, **changes})
 
 
 def bar_test() -> Scene:

@@ -263,7 +263,7 @@ MODAL_STATE = np.dtype(
         ("piston_time", "i8"),
         ("no_park", "i8"),
         ("closed_at", "i8"),
-        ("held_from", "i8"),  # when mean forces of components were taken, and for how long they hold
+        ("held_from", "i8"),  # mean forces of components are held from then on
         ("held_until", "i8"),
         ("rest_until", "i8"),  # no front of a blow on a bit at rest can be at the rock before
         ("alert", "i8"),  # 1: standstill may end by the energy of the bit
