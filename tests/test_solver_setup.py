@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from percussion_model.components import DRIVES as COMPONENT_DRIVES
 from percussion_model.physics.records import DriveKind, RockKind
 from percussion_model.scene.numbers import SCENE_NUMBERS, Numbers, numbers_of, scene_numbers
 from percussion_model.scene.parameters import find_row
@@ -47,6 +48,9 @@ def test_choices_stand_in_the_order_of_the_table(key, names):
     if key == "effects.rock":  # the power law has the modes of the bilinear one
         assert choices.pop() == "power"
         assert ROCKS[4:] == (RockKind.BILINEAR,)
+    if key == "effects.drive":  # components follow
+        assert [one.name for one in COMPONENT_DRIVES] == choices[3:]
+        choices[3:] = ["component"] * len(COMPONENT_DRIVES)
     assert [one.name.lower() for one in names] == choices
 
 

@@ -61,6 +61,14 @@ TERMINALS = (
         },
     ),
     Terminal(
+        "air",
+        "supply of chambers with air, for effects.drive = pneumatic",
+        {
+            "supply_pressure": "pneumatic.supply_pressure",
+            "supply_flow": "pneumatic.supply_flow",
+        },
+    ),
+    Terminal(
         "rock",
         "rock under the bit, where its properties change with depth",
         {

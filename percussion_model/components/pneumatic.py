@@ -125,7 +125,7 @@ def rates_of(par, supply, y):
     heat_u = wall * (cold - upper.root * upper.root / AIR)
     heat_l = wall * (cold - lower.root * lower.root / AIR)
     area_u, area_l = par.pneumatic_upper_area, par.pneumatic_lower_area
-    grow_l = area_l * v if x > 0.0 else 0.0
+    grow_l = area_l * v if x >= 0.0 else 0.0
     grow_u = -area_u * v if area_u * x < (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume else 0.0
     rubbing = par.pneumatic_friction * v / math.sqrt(v * v + CREEP * CREEP)
     force = upper.pressure * area_u - lower.pressure * area_l
@@ -209,7 +209,7 @@ def go(par, supply, y, way):
             rate = rates_of(par, supply, on_way(way, here, t + PARTS[stage] * h))
             if stage == 0:
                 steps = left * max(1.0 / par.pneumatic_step, rate.rate / STABLE)
-                h = left / math.ceil(steps - 1e-9)
+                h = left / max(math.ceil(steps - 1e-9), 1)
             end = plus(end, rate, SHARES[stage] * h)
             here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
         t += h
@@ -338,7 +338,8 @@ def settle(par, s):
     s.pneumatic_consumed += then.used
     s.pneumatic_gas_work += then.work
     s.pneumatic_held_work = s.pneumatic_given_work
-    s.pneumatic_bit_velocity = bit
+    # over a short time it may be that of ringing alone
+    s.pneumatic_bit_velocity += min(h / par.pneumatic_step, 1.0) * (bit - s.pneumatic_bit_velocity)
     s.pneumatic_span = s.pneumatic_since = 0.0
 
 

@@ -38,6 +38,8 @@ SERIES = (
     -1.1401584742998243e-08,
 )
 ROOT_7 = math.sqrt(7.0)
+_POWERS = STRAIGHT ** (2.0 / RATIO) - STRAIGHT ** (1.0 + 1.0 / RATIO)
+AT_STRAIGHT = math.sqrt(2.0 * RATIO / (RATIO - 1.0) * _POWERS)
 
 
 @inlined
@@ -48,9 +50,6 @@ def isentropic(r):
     for k in range(len(SERIES) - 1, -1, -1):
         y = y * t + SERIES[k]
     return ROOT_7 * y * y * math.sqrt(max(y * (1.0 - y), 0.0))
-
-
-AT_STRAIGHT = isentropic(STRAIGHT)
 
 
 @inlined

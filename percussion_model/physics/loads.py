@@ -44,16 +44,15 @@ def _and_drive(before: Callable, one: Component) -> Callable:
     held = f"f_{one.name}_bit"
 
     @composed
-    def add(s: Any, h: float) -> None:
-        before(s, h)
-        s.i_on_bit += s[held] * h
+    def add(s: Any) -> float:
+        return before(s) + s[held]
 
     return add
 
 
 @composed
-def _no_drive(s: Any, h: float) -> None:
-    pass
+def _no_drive(s: Any) -> float:
+    return 0.0
 
 
 @composed
@@ -141,8 +140,8 @@ book_on_piston = _joined(_nothing, _and_work, "piston")
 # pass_own_time(par, s, h): take the states of components on by h [s].
 pass_own_time = _joined(_nothing, _and_time)
 
-# note_drive(s, h): enter the impulse of drives on the bit.
-note_drive = _joined(_no_drive, _and_drive)
+# drive_on_bit(s): force of drives on the bit [N].
+drive_on_bit = _joined(_no_drive, _and_drive)
 
 # slope_on_piston(par, s): how fast the force on the piston changes while it is held [N/s].
 slope_on_piston = _joined(_steady, _and_slope)
@@ -163,7 +162,7 @@ def hold_components(par, s, h):
 def pass_time(par, s, h):
     """Take the states of components on by a time h, at whose end the bodies are."""
     if par.effects == 1:
-        note_drive(s, h)
+        s.i_on_bit += drive_on_bit(s) * h
         pass_own_time(par, s, h)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from percussion_model.physics.blows import filled_from_state
 from percussion_model.physics.kernel import merged, when_compiling
-from percussion_model.physics.loads import drive_force
+from percussion_model.physics.loads import drive_force, drive_on_bit
 from percussion_model.physics.records import LEDGER_ENTRIES, PEAK_FIELDS, SAMPLE_COLUMNS, Piston
 from percussion_model.physics.rock import hole_depth
 
@@ -53,6 +53,8 @@ def fill_motion(par, s, reading, time, piston_position, bit_position):
     reading.bit_end_position = s.x_r + s.p - s.climb
     reading.hole_depth = hole_depth(par, s)
     reading.drive_force = drive_force(par, s)
+    reading.recoil_force = reading.drive_force + drive_on_bit(s)
+    reading.recoil_impulse = s.i_drive + s.i_on_bit
     fill_columns(s, reading)
     if par.piston == Piston.ABSENT:
         reading.piston_position = math.nan

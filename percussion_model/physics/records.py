@@ -184,6 +184,8 @@ SAMPLE_COLUMNS = (
     Column("bit_force", "N", "force of the bit on the rock"),
     Column("contact_force", "N", "force of the piston on the bit"),
     Column("drive_force", "N", "force of the drive on the piston, positive down"),
+    Column("recoil_force", "N", "force of the drive on piston and bit: up on the casing"),
+    Column("recoil_impulse", "N s", "integral of the recoil since the run began"),
     Column("drilling_mode", "", "mode of the rock law, by its number", of="mode"),
     Column("bit_kinetic_energy", "J", "kinetic energy of the whole bit"),
     Column("bit_impulse", "N s", "integral of the bit force since the run began", of="i_bit"),

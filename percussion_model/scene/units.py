@@ -35,7 +35,7 @@ _UNIT = re.compile(rf"{_FACTOR}(?:{_SIGN}{_FACTOR}){{0,5}}")
 _QUANTITY = re.compile(rf"[ ]*(?P<number>{_NUMBER})[ ]*(?P<unit>{_UNIT.pattern})[ ]*")
 _FACTORS = re.compile(r"(?P<sign>^|[ *·/]+)(?P<name>[A-Za-zµμ]+|%)(?P<power>[²³]|\^?-?[1-9])?")
 # Temperatures and bits are in no parameter.
-_DIMENSIONS = {"[length]", "[mass]", "[time]", "[angle]"}
+_DIMENSIONS = {"[length]", "[mass]", "[time]", "[angle]", "[temperature]"}
 # For pint these have no dimension: then a frequency were a speed of rotation.
 _ANGLES = ("rad", "radian", "deg", "degree", "revolution", "turn")
 _ROTATION = ("rpm",)
@@ -82,6 +82,9 @@ QUANTITIES = {
     "N m": Quantity("a torque", ("600", "0.6 kN m", "442.5 ft lbf"), ("kN m", "ft lbf")),
     "m^3": Quantity("a volume", ("5e-6", "5 cm^3"), ("cm^3", "l", "in^3")),
     "J/m^3": Quantity("an energy by volume", ("5.5e7", "55 MJ/m^3"), ("MJ/m^3", "J/cm^3")),
+    "kg/s": Quantity("a mass flow", ("0.45", "27 kg/min"), ("kg/min", "g/s", "lb/min")),
+    "K": Quantity("a temperature", ("300", "300000 mK"), ("mK",)),
+    "W/K": Quantity("a conductance of heat", ("50", "0.05 kW/K"), ("kW/K",)),
     "-": Quantity("a pure number", ("0.01", "1 %"), ("%",)),
 }  # fmt: skip
 

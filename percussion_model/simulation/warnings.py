@@ -224,7 +224,9 @@ def _about_breaking(result: Result) -> Iterator[str]:
     if scene.effects.feed and scene.feed.on == "casing":
         gravity = scene.gravity.acceleration if scene.effects.gravity else 0.0
         held = scene.feed.force + scene.feed.casing_mass * gravity
-        yield from recoil_note(float(blows["drive_impulse"].sum() / blows["period"].sum()), held)
+        on_bit = (end["recoil_impulse"] - end["drive_impulse"]) / result.duration
+        on_piston = float(blows["drive_impulse"].sum() / blows["period"].sum())
+        yield from recoil_note(on_piston + on_bit, held)
     energy = by_volume(numbers_over(blows), scene.hole_diameter).get("specific_energy")
     if energy is not None and (named := rock_of(scene)):
         strength = read_rock(named).strength

@@ -211,9 +211,15 @@ def test_independent_solvers_agree_on_a_hammer_with_chambers(runs):
 
 
 def test_work_of_the_gas_is_the_work_that_the_solver_gave(runs):
-    for name, bound in (("modal", 5e-5), ("rigid", 1e-4), ("wave", 5e-4), ("fem", 2e-3)):
-        end = runs[name].end
-        gas, held = end["pneumatic_gas_work"], end["pneumatic_held_work"]
+    """But for the first blow, which is not yet one of the cycle."""
+    for name, bound in (("modal", 3e-5), ("rigid", 1e-4), ("wave", 5e-4), ("fem", 2e-3)):
+        simulation = Simulation(drilling(name))
+        works = []
+        for time in (0.06, 0.5):
+            simulation.advance(time)
+            seen = simulation.observe()
+            works.append([seen[f"pneumatic_{which}_work"] for which in ("gas", "held")])
+        gas, held = (after - before for before, after in zip(*works, strict=True))
         assert abs(gas - held) < bound * gas, name
         assert abs(runs[name].energy["residual_relative"]) < 1e-9
 

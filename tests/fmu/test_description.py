@@ -69,7 +69,7 @@ def test_every_variable_says_what_it_is(fmus, name):
 
 
 def test_units_are_what_they_are_made_of():
-    dimension = {"m": (1, 0, 0), "kg": (0, 1, 0), "s": (0, 0, 1)}
+    dimension = {"m": (1, 0, 0), "kg": (0, 1, 0), "s": (0, 0, 1), "K": (0, 0, 0)}
     dimension["N"] = (1, 1, -2)
     dimension["J"] = (2, 1, -2)
     dimension["Pa"] = (-1, 1, -2)

@@ -70,7 +70,16 @@ def test_no_whole_number_is_without_limits(runs, name):
 STEPS = ("step", "leap_end")
 # Ticks, sets and counts of modes of the modal solver, of which tests/test_modal.py has a test.
 OF_MODES = (
-    *("time", "look", "piston_time", "no_park", "closed_at", "rest_until"),
+    *(
+        "time",
+        "look",
+        "piston_time",
+        "no_park",
+        "closed_at",
+        "rest_until",
+        "held_from",
+        "held_until",
+    ),
     *("active", "pairs", "stride", "law"),
 )
 

@@ -273,8 +273,8 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
     t = seen["time"]
     weight = scene.gravity.acceleration if scene.effects.gravity else 0.0
     feed = scene.feed.force if scene.effects.feed else 0.0
-    impulses = (seen[f"{name}_impulse"] for name in ("contact", "bit", "drive"))
-    contact, rock, drive = (impulse - impulse[0] for impulse in impulses)
+    impulses = (seen[f"{name}_impulse"] for name in ("contact", "bit", "drive", "recoil"))
+    contact, rock, drive, recoil = (impulse - impulse[0] for impulse in impulses)
     m_b, m_p = (mass_of(watch.simulation, bar) for bar in ("bit", "piston"))
     # at a grid point one reads the first instant after it, or the point where inputs change
     late = (watch.simulation.solver.time_step or 0.0) * (1.0 if case.changes else SHORTEST)
@@ -282,6 +282,7 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
     if "feed_force" not in case.changes and not has_casing(scene):
         push = feed + m_b * weight
         parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), -push * t, -contact, rock)
+        parts += (drive - recoil,)
         check_sum(parts, m_b * np.abs(seen["bit_velocity"]).max(), abs(push) * late, "bit")
     if scene.piston.model != "absent":
         push = m_p * weight

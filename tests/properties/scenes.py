@@ -71,7 +71,19 @@ ADVANCE: dict[str, tuple[Any, ...]] = {
     "rotation.full_torque": (1e-3, 1e8, ZERO),
     "rotation.response": (1e-6, 1e3, ZERO),
 }
-BOUNDS = WIDE | ADVANCE
+# Of chambers of air, drawn after that.
+AIR: dict[str, tuple[Any, ...]] = {
+    "pneumatic.supply_pressure": (1e3, 1e7, ZERO),
+    "pneumatic.supply_volume": (1e-5, 1.0, ZERO),
+    "pneumatic.supply_flow": (1e-4, 10.0, ZERO),
+    "pneumatic.lower_volume": (1e-5, 1e-2),
+    "pneumatic.upper_intake_edge": (1e-3, 0.2, ZERO),
+    "pneumatic.upper_exhaust": (1e-6, 1e-2, ZERO),
+    "pneumatic.leak": (1e-8, 1e-4, ZERO),
+    "pneumatic.ramp": (1e-6, 1e-2),
+    "pneumatic.wall_conductance": (1e-3, 1e3, ZERO),
+}
+BOUNDS = WIDE | ADVANCE | AIR
 SWITCHES = ("effects.breaking", "effects.rotation")
 # What a scene with breaking or rotation has to be given.
 NO_DEFAULT = ("hole_diameter", "breaking.buttons", "rotation.mean_radius")
@@ -190,6 +202,8 @@ def draw_case(source: Source, reaches: tuple[str, ...] = ("near", "wide", "wide"
     scene = scene.replace(**{"run.duration": min(max(length, 1e-300), 1e6), "run.settle": 0.0})
     calls = draw_calls(source, scene, reach)
     scene = with_advance(source, scene, reach)
+    if scene.effects.drive == "pneumatic":  # drawn last, so that inputs of its like are void
+        calls = [call for call in calls if call[1] not in ("inputs", "detour")]
     if scene.effects.rotation and chance(source, 50):
         speed = number(source, "rotation.speed", reach)
         calls.append((source.between(0.0, 1.0), "inputs", {"rotation_speed": speed}))
@@ -258,6 +272,12 @@ def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
         changes["rotation.renewal_length"] = 0.0
     changes["rotation.old_line"] = not (scene.effects.cuttings or rings) and chance(source, 40)
     changes["rock.removed_by"] = source.pick(("blow", "cycle"))
+    for key in AIR:
+        value = number(source, key, reach)
+        if value is not None:
+            changes[key] = value
+    if scene.effects.drive == "pressure" and chance(source, 20):
+        changes["effects.drive"] = "pneumatic"
     return scene.replace(**changes)
 
 

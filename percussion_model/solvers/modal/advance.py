@@ -489,6 +489,7 @@ def read_at(par, s, bars, time, row):
     row.bit_impulse += rest * s.f_rock
     row.contact_impulse += rest * s.f_contact
     row.drive_impulse += rest * row.drive_force
+    row.recoil_impulse += rest * row.drive_force  # that on the bit has passed with its time
 
 
 @kernel

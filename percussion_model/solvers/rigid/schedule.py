@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.kernel import kernel
 from percussion_model.physics.loads import (
     drive_force,
     hold_components,
-    lasting,
     piston_acceleration,
     room_to_turn,
 )
@@ -214,19 +213,13 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
     return tau, kind
 
 
-@inlined
-def hold_time(par, s):
-    """Time for which forces of components are held where nothing happens [s]."""
-    return min(par.window, lasting(par, s))
-
-
 @kernel
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
     s.closed = s.held
-    hold_components(par, s, hold_time(par, s))
+    hold_components(par, s, par.window)
     find_next(par, s)
-    if par.effects == 1 and 0.0 < s.next_tau < hold_time(par, s):
+    if par.effects == 1 and 0.0 < s.next_tau < par.window:
         hold_components(par, s, s.next_tau)
         find_next(par, s)
 
@@ -264,8 +257,8 @@ def find_next(par, s):
     tau = later
     if par.piston != Piston.ABSENT:
         tau, kind = piston_event(par, s, y, acc, beta, k, tau, kind)
-    if par.effects == 1 and tau > hold_time(par, s):
-        tau = hold_time(par, s)
+    if par.effects == 1 and tau > par.window:
+        tau = par.window
         kind = Next.HOLD
     s.next_tau = tau
     s.next_time = s.time + tau
