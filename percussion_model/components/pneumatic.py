@@ -34,8 +34,10 @@ STABLE = 1.5
 PARTS, SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 # Most steps of one integration: a volume a thousandth of a usual one needs 1,300.
 MOST_STEPS = 20_000
-# Of a chamber that a piston fills no less than this share of its volume is left.
-LEAST_SHARE = 1e-4
+# A stop of some stiffness [N/m] leaves about this share of the upper chamber.
+LEAST_SHARE, STOP = 1e-2, 1e8
+# Steps are short by how fast a chamber shrinks, and by how fast a piston swings on its gas.
+SHRINKS, SWINGS = 2.0, 3.0
 # No volume is empty at the start [Pa].
 LEAST_PRESSURE = 100.0
 # A way foretold to this is the real one but for the work of the difference [m].
@@ -130,6 +132,14 @@ def rates_of(par, supply, y):
     rubbing = par.pneumatic_friction * v / math.sqrt(v * v + CREEP * CREEP)
     force = upper.pressure * area_u - lower.pressure * area_l
     force += rubbing - outside(par) * (area_u - area_l)
+    beyond = x - (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume / area_u
+    force += STOP * max(beyond, 0.0)
+    swings = (
+        RATIO
+        / par.mass_p
+        * max(upper.pressure * area_u * area_u / size_u, lower.pressure * area_l * area_l / size_l)
+    )
+    shrinks = abs(v) * max(area_u / size_u, area_l / size_l)
     stiff_u = to_upper.stiffness + from_upper.stiffness + across.stiffness
     stiff_l = to_lower.stiffness + from_lower.stiffness + across.stiffness
     stiff_x = past.stiffness + from_upper.stiffness + from_lower.stiffness + out.stiffness
@@ -148,7 +158,10 @@ def rates_of(par, supply, y):
         force,
         (lower.pressure - outside(par)) * area_l,
         -force * v,
-        max(stiff_u / size_u, stiff_l / size_l, stiff_x / size_x),
+        max(
+            max(stiff_u / size_u, stiff_l / size_l, stiff_x / size_x),
+            max(SWINGS * math.sqrt(max(swings, 0.0)), SHRINKS * shrinks),
+        ),
     )
 
 
@@ -449,11 +462,11 @@ COMPONENT = Component(
     "two chambers of air with ports that the piston opens, as of a down-the-hole hammer",
     {
         "supply_pressure": (24e5, "Pa", "pressure of the supply at the hammer, above that of the "
-                            "surroundings", 0.0, 1e8),
+                            "surroundings", 0.0, 2e7),
         "supply_flow": (0.0, "kg/s", "most that the compressor gives; 0: as much as is needed",
                         0.0, 1e3),
-        "supply_volume": (0.0, "m^3", "volume of the supply; 0: its pressure never falls",
-                          0.0, 1e3),
+        "supply_volume": (0.2, "m^3", "volume of the supply; 0: its pressure never falls, "
+                          "whatever the compressor gives", 0.0, 1e3),
         "supply_temperature": (300.0, "K", "temperature of the supply", 100.0, 2000.0),
         "ambient_pressure": (101325.0, "Pa", "pressure of the surroundings", 0.0, 1e7),
         "ambient_temperature": (293.15, "K", "temperature of the surroundings", 100.0, 2000.0),

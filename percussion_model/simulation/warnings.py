@@ -157,8 +157,8 @@ def _about_supply(result: Result) -> Iterator[str]:
     scene = result.scene
     if scene.effects.drive != "pneumatic" or not result.end:
         return
-    set_to = scene["pneumatic.supply_pressure"] + scene["pneumatic.ambient_pressure"]
-    found = result.end["pneumatic_supply"]
+    set_to = scene["pneumatic.supply_pressure"]
+    found = result.end["pneumatic_supply"] - scene["pneumatic.ambient_pressure"]
     if found < STARVED * set_to:
         yield (
             f"the compressor gives too little air (pneumatic.supply_flow): the supply has fallen "
@@ -228,7 +228,7 @@ def _about_breaking(result: Result) -> Iterator[str]:
         on_piston = float(blows["drive_impulse"].sum() / blows["period"].sum())
         yield from recoil_note(on_piston + on_bit, held)
     energy = by_volume(numbers_over(blows), scene.hole_diameter).get("specific_energy")
-    if energy is not None and (named := rock_of(scene)):
+    if energy is not None and energy > 0.0 and (named := rock_of(scene)):
         strength = read_rock(named).strength
         if strength is not None:
             yield from specific_energy_note(energy, named, strength.value)

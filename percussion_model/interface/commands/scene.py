@@ -264,6 +264,8 @@ def new(
     elif pressure is not None:
         if hammer is None or rods is not None:
             raise common.refusal("--pressure needs --hammer: one that works down the hole")
+        if not any(sign.isalpha() for sign in pressure.replace("e", "")):
+            raise common.refusal(f"--pressure {pressure}: needs a unit, as in '24 bar'")
         scene = with_air(hammer, read_number(_SUPPLY, pressure, "--pressure"))
     elif hammer is not None:
         scene = find(hammer, rods)
