@@ -183,15 +183,15 @@ def test_frequency_velocity_and_air_are_those_of_an_independent_model(
     assert blows["pneumatic_air"].mean() * 60.0 / 1.2923 == pytest.approx(air, rel=1e-2)
 
 
-def test_half_the_step_hardly_changes_the_blows():
+def test_shorter_steps_come_closer_to_the_same_blows():
     usual = drilling("modal")["pneumatic.step"]
     velocities = [
         simulate(drilling("modal", **{"pneumatic.step": step}), 0.5).blows["impact_velocity"][-4:]
-        for step in (usual, 0.5 * usual, 0.05 * usual)
+        for step in (2.0 * usual, usual, 0.25 * usual, 0.05 * usual)
     ]
     errors = [abs(velocity.mean() / velocities[-1].mean() - 1.0) for velocity in velocities]
-    assert errors[0] < 1e-4
-    assert errors[1] < 0.6 * errors[0]
+    assert errors[1] < 1e-4
+    assert errors[2] < 0.5 * errors[1] < 0.25 * errors[0]
 
 
 def drilling(solver, **changes):
@@ -298,7 +298,7 @@ def test_pressures_are_asked_for_with_a_unit(tmp_path):
     assert scene["pneumatic.supply_pressure"] == 24e5
     assert scene.effects.drive == "pneumatic"
     other = CliRunner().invoke(app, ["new", "x.toml", "--hammer", "t38", "--pressure", "24 bar"])
-    assert "no chambers of air are known of it" in other.stderr
+    assert "no chambers of air are known of it" in str(other.exception)
 
 
 def test_a_piston_at_rest_between_the_edges_is_told_to_have_stalled():
