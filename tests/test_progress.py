@@ -17,6 +17,8 @@ import pytest
 from fitting_data import noisy_curve
 
 from percussion_model import Scene, simulate
+from percussion_model.analysis.fitting import fit
+from percussion_model.analysis.fitting.sampling import walk
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.progress import RunProgress, progress_bar
@@ -118,7 +120,7 @@ def test_every_command_says_on_a_pipe_that_it_runs(arguments, heard, tmp_path, m
 
 
 def test_a_calibration_says_on_a_pipe_that_it_runs(heard, tmp_path, monkeypatch):
-    """Its work is held up where it reads the curve."""
+    """Its work is held up where it reads the curve, and at the end of each walk."""
     curve = noisy_curve(1)
     columns = np.column_stack([curve.penetration, curve.force])
     np.savetxt(tmp_path / "slow.csv", columns, delimiter=",",
@@ -130,7 +132,13 @@ def test_a_calibration_says_on_a_pipe_that_it_runs(heard, tmp_path, monkeypatch)
             heard.wait_for(2)
         return read(path, *words, **options)
 
+    def slow_walk(*words):
+        met = walk(*words)
+        heard.wait_for(heard.progress() + 1)
+        return met
+
     monkeypatch.setattr(Path, "open", held)
+    monkeypatch.setattr(fit, "walk", slow_walk)
     words = ["calibrate", str(ROOT / "scenarios" / "drop_test.toml"), "--curve"]
     code = _guarded(lambda: app([*words, str(tmp_path / "slow.csv")], standalone_mode=False))
     assert code != BAD_INPUT
