@@ -14,11 +14,12 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 import percussion_model.components.pneumatic as gas
+from percussion_model.physics.gas import FREE_AIR
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.hammers.library import stored_hammer
 
-# Free air [kg/m^3]; velocity after a blow by that before it.
-FREE_AIR, REBOUND = 1.2923, 0.3
+# Velocity after a blow by that before it.
+REBOUND = 0.3
 # Blows from rest in a search, of which the last are looked at.
 BLOWS, LAST = 12, 2
 # Share of the outer circle that a piston's area may have; of the chamber that a stroke may take.
@@ -52,25 +53,20 @@ DTYPE = np.dtype(
 def strike(pars, supply, out):
     """Let a piston strike from rest; rows are time, velocity, air, and stroke of a blow."""
     par, n, t, begun, most = pars[0], 0, 0.0, 0.0, 0.0
-    pressure = gas.outside(par)
-    p, q = pressure / (gas.AIR * par.pneumatic_ambient_temperature), pressure / (gas.RATIO - 1.0)
-    u, w = gas.size_of_upper(par, 0.0), gas.size_of_lower(par, 0.0)
-    x = par.pneumatic_exhaust_volume
-    filled = gas.Gas(p * u, q * u, p * w, q * w, p * x, q * x)
-    y = gas.Ahead(filled, 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0)
+    y = gas.started(gas.open_air(par, 0.0), 1e-3, 0.0)
     while n < out.shape[0] and t - begun < 0.15:
-        span = gas.AHEAD
-        z = gas.go(par, supply, y, gas.Way(False, 0.0, 0.0, 0.0, 0.0, span))
+        span = par.pneumatic_step
+        z = gas.go(par, supply, y, gas.flight(span))
         if z.x < 0.0:
             for _ in range(4):
                 if z.v >= 0.0:
                     return n
-                span = min(max(span - z.x / z.v, 1e-7), gas.AHEAD)
-                z = gas.go(par, supply, y, gas.Way(False, 0.0, 0.0, 0.0, 0.0, span))
+                span = min(max(span - z.x / z.v, 1e-7), par.pneumatic_step)
+                z = gas.go(par, supply, y, gas.flight(span))
             begun = t + span
             out[n, 0], out[n, 1], out[n, 2], out[n, 3] = begun, -z.v, z.used, most
             n, most = n + 1, 0.0
-            z = gas.Ahead(z.gas, 0.0, -REBOUND * z.v, z.used, z.impulse, z.on_bit, z.work)
+            z = gas.started(z.gas, 0.0, -REBOUND * z.v)
         t, y = t + span, z
         most = max(most, z.x)
         if par.pneumatic_upper_area * most > MOST_STROKE * par.pneumatic_upper_volume:
@@ -99,9 +95,9 @@ def run(name: str, values: dict[str, float], blows: int = BLOWS) -> np.ndarray |
         out = np.zeros((blows, 4))
         if strike(par, at + given["ambient_pressure"], out) < blows:
             return None
-        last, (time, used) = out[-LAST:], (out[-1] - out[-1 - LAST])[[0, 2]]
+        last, time = out[-LAST:], out[-1, 0] - out[-1 - LAST, 0]
         v = math.sqrt(np.mean(last[:, 1] ** 2))
-        air, unrest = used / time / FREE_AIR, np.ptp(last[:, 1]) / v
+        air, unrest = last[:, 2].sum() / time / FREE_AIR, np.ptp(last[:, 1]) / v
         rows.append((LAST / time, v, air, last[:, 3].max(), unrest))
     return np.array(rows)
 

@@ -140,8 +140,10 @@ def effect_variants(scene: Scene) -> Iterator[Variant]:
 
 def _can_turn(scene: Scene, one: Component) -> bool:
     """Whether a component can be turned: it is on, or acts and has all that it needs."""
-    if one.is_drive or scene[f"effects.{one.name}"]:
-        return not one.is_drive
+    if one.is_drive:
+        return False
+    if scene[f"effects.{one.name}"]:
+        return True
     acts = all(scene[key] in values for key, values in one.needs.items())
     needed = [name for name, (default, *_) in one.parameters.items() if default is None]
     known = [scene[f"{one.name}.{name}"] for name in needed]

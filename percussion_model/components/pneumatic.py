@@ -17,13 +17,7 @@ import math
 from typing import NamedTuple
 
 from percussion_model.components import Component
-from percussion_model.physics.gas import (
-    AIR,
-    RATIO,
-    flow,
-    reservoir,
-    volume_of,
-)
+from percussion_model.physics.gas import AIR, RATIO, flow, reservoir, volume_of
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Where piston and bit touch, or may, gas is foretold for this share of the usual time.
@@ -71,7 +65,13 @@ class Ahead(NamedTuple):
     impulse: float  # on the piston, down [N s]
     on_bit: float  # on the bit [N s]
     work: float  # on the piston's motion relative to the bit [J]
-    rate: float  # at which one of the volumes comes to a pressure, at most [1/s]
+    rate: float  # of what goes on in it, which steps must be short against [1/s]
+
+
+@inlined
+def started(gas, x, v):
+    """Gas with a piston above the bit, before either has moved."""
+    return Ahead(gas, x, v, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
@@ -110,7 +110,7 @@ def rates_of(par, supply, y):
     lower = volume_of(gas.mass_l, gas.energy_l, size_l)
     behind = volume_of(gas.mass_x, gas.energy_x, size_x)
     air = reservoir(supply, par.pneumatic_supply_temperature)
-    open_air = reservoir(outside(par), par.pneumatic_ambient_temperature)
+    around = reservoir(outside(par), par.pneumatic_ambient_temperature)
     share = par.pneumatic_discharge
     to_upper = flow(air, upper, opened(
         par, par.pneumatic_upper_intake, x - par.pneumatic_upper_intake_edge))  # fmt: skip
@@ -122,7 +122,7 @@ def rates_of(par, supply, y):
         par, par.pneumatic_lower_exhaust, x - par.pneumatic_lower_exhaust_edge))  # fmt: skip
     across = flow(upper, lower, share * par.pneumatic_leak)
     past = flow(air, behind, share * par.pneumatic_bypass)
-    out = flow(behind, open_air, share * par.pneumatic_flushing)
+    out = flow(behind, around, share * par.pneumatic_flushing)
     wall, cold = par.pneumatic_wall_conductance, par.pneumatic_wall_temperature
     heat_u = wall * (cold - upper.root * upper.root / AIR)
     heat_l = wall * (cold - lower.root * lower.root / AIR)
@@ -134,15 +134,12 @@ def rates_of(par, supply, y):
     force += rubbing - outside(par) * (area_u - area_l)
     beyond = x - (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume / area_u
     force += STOP * max(beyond, 0.0)
-    swings = (
-        RATIO
-        / par.mass_p
-        * max(upper.pressure * area_u * area_u / size_u, lower.pressure * area_l * area_l / size_l)
-    )
-    shrinks = abs(v) * max(area_u / size_u, area_l / size_l)
-    stiff_u = to_upper.stiffness + from_upper.stiffness + across.stiffness
-    stiff_l = to_lower.stiffness + from_lower.stiffness + across.stiffness
-    stiff_x = past.stiffness + from_upper.stiffness + from_lower.stiffness + out.stiffness
+    by_u, by_l = area_u / size_u, area_l / size_l
+    spring = RATIO * max(upper.pressure * area_u * by_u, lower.pressure * area_l * by_l)
+    swings = SWINGS * math.sqrt(max(spring, 0.0) / par.mass_p)
+    fills_u = (to_upper.stiffness + from_upper.stiffness + across.stiffness) / size_u
+    fills_l = (to_lower.stiffness + from_lower.stiffness + across.stiffness) / size_l
+    fills_x = past.stiffness + from_upper.stiffness + from_lower.stiffness + out.stiffness
     return Ahead(
         Gas(
             to_upper.mass - from_upper.mass - across.mass,
@@ -158,10 +155,7 @@ def rates_of(par, supply, y):
         force,
         (lower.pressure - outside(par)) * area_l,
         -force * v,
-        max(
-            max(stiff_u / size_u, stiff_l / size_l, stiff_x / size_x),
-            max(SWINGS * math.sqrt(max(swings, 0.0)), SHRINKS * shrinks),
-        ),
+        max(fills_u, fills_l, fills_x / size_x, swings, SHRINKS * abs(v) * max(by_u, by_l)),
     )
 
 
@@ -197,6 +191,12 @@ class Way(NamedTuple):
     then_x: float
     then_v: float
     span: float  # [s]
+
+
+@inlined
+def flight(span):
+    """Way of a piston that flies for a time."""
+    return Way(False, 0.0, 0.0, 0.0, 0.0, span)
 
 
 @inlined
@@ -265,14 +265,12 @@ def set_pressure(par, s):
 
 
 @inlined
-def begin(par, s):
-    """Fill all volumes for the first time: with air of the surroundings, the supply's with its."""
-    x, warm = -s.u_r, AIR * par.pneumatic_ambient_temperature
+def open_air(par, x):
+    """Gas of the surroundings in all volumes, as before a first blow."""
     pressure = max(outside(par), LEAST_PRESSURE)
-    p, q = pressure / warm, pressure / (RATIO - 1.0)
+    m, e = pressure / (AIR * par.pneumatic_ambient_temperature), pressure / (RATIO - 1.0)
     u, low, behind = size_of_upper(par, x), size_of_lower(par, x), par.pneumatic_exhaust_volume
-    keep_gas(par, s, Gas(p * u, q * u, p * low, q * low, p * behind, q * behind))
-    s.pneumatic_supply = set_pressure(par, s)
+    return Gas(m * u, e * u, m * low, e * low, m * behind, e * behind)
 
 
 @inlined
@@ -341,8 +339,7 @@ def settle(par, s):
         then = corrected(par, s, then, x)
     else:
         way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h)
-        y = Ahead(present_gas(s), before, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        then = go(par, s.pneumatic_supply, y, way)
+        then = go(par, s.pneumatic_supply, started(present_gas(s), before, 0.0), way)
     keep_gas(par, s, then.gas)
     feed_supply(par, s, then.used, h)
     s.pneumatic_owed += then.impulse - s.pneumatic_given
@@ -362,7 +359,7 @@ def foretell(par, s, span):
     x, v, d = -s.u_r, s.pneumatic_bit_velocity - s.v_p, span
     s.pneumatic_from_x, s.pneumatic_from_v = x, s.v_p
     s.pneumatic_touched, s.pneumatic_last_u = s.closed, s.u_r
-    y = Ahead(present_gas(s), x, v, 0.0, 0.0, 0.0, 0.0, 0.0)
+    y = started(present_gas(s), x, v)
     u = s.v_b - s.v_p  # at which a piston that touches the bit goes on
     then = go(par, s.pneumatic_supply, y, Way(s.closed == 1, x, u, x + u * d, u, d))
     s.pneumatic_span, s.pneumatic_since = span, 0.0
@@ -388,10 +385,10 @@ def is_over(s):
     since, span = s.pneumatic_since, s.pneumatic_span
     if span == 0.0 or since >= (1.0 - 1e-9) * span or s.closed != s.pneumatic_touched:
         return True
-    expected = s.pneumatic_from_v
-    if s.closed == 0:
-        expected += (s.pneumatic_then_v - expected) * since / span
-    return s.closed == 0 and abs(s.v_p - expected) > JUMP
+    if s.closed == 1:
+        return False
+    expected = s.pneumatic_from_v + (s.pneumatic_then_v - s.pneumatic_from_v) * since / span
+    return abs(s.v_p - expected) > JUMP
 
 
 @inlined
@@ -407,7 +404,8 @@ def renew(par, s, h):
     if not is_over(s):
         return
     if s.pneumatic_mass_u == 0.0:
-        begin(par, s)
+        keep_gas(par, s, open_air(par, -s.u_r))
+        s.pneumatic_supply = set_pressure(par, s)
     elif s.pneumatic_since > 0.0:
         settle(par, s)
     # what is asked for less is held on in steps

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from percussion_model.interface.messages import wrapped
 from percussion_model.interface.tables import airy_table, named_table, print_notes, print_table
+from percussion_model.physics.gas import FREE_AIR
 from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
 from percussion_model.simulation.uncertain import (
@@ -58,7 +59,7 @@ SHOWN = (
     ("Peak bit force", "peak_bit_force", 1e-3, "kN"),
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
-    ("Free air (0 °C, 1 atm)", "pneumatic_air", 60.0 / 1.2923, "m³/min"),
+    ("Free air (0 °C, 1 atm)", "pneumatic_air", 60.0 / FREE_AIR, "m³/min"),
 )
 # A smaller relative error of the wave speed is rounding.
 LEAST_MISFIT = 1e-6

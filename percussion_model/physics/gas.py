@@ -13,6 +13,8 @@ from percussion_model.physics.kernel import inlined, kernel
 
 # Gas constant of air [J/(kg K)], and the ratio of its specific heats.
 AIR, RATIO = 287.05, 1.4
+# Free air: dry, at 0 C and 101325 Pa (DIN 1343) [kg/m^3].
+FREE_AIR = 1.2923
 # Specific heat at constant pressure [J/(kg K)].
 HEAT = AIR * RATIO / (RATIO - 1.0)
 # Flow below this ratio of pressures is choked, and has the flow function of this ratio.

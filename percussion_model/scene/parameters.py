@@ -184,12 +184,7 @@ class RockLaw(Parameters):
         le=1e13,
     )
     unloading_ratio: float = quantity(
-        5.0,
-        "-",
-        "gamma: unloading by loading stiffness",
-        ROCK_CRUSHED,
-        gt=1,
-        le=1e4,
+        5.0, "-", "gamma: unloading by loading stiffness", ROCK_CRUSHED, gt=1, le=1e4
     )
     loading_exponent: float = quantity(
         1.5, "-", "n of the power law: force grows as penetration^n", ROCK_POWER, ge=1, le=4
@@ -453,10 +448,9 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
         Each gets a switch in `effects` and, for its parameters, a group of its own.
     """
     groups = dict(_BUILT_IN)
-    switches: dict[str, Any] = {}
-    drives: dict[str, str] = {}
+    plain, switches, drives = _BUILT_IN["effects"], dict[str, Any](), dict[str, str]()
     for one in components:
-        if one.name in groups or one.name in switches or one.name in _BUILT_IN["effects"].rows:
+        if one.name in groups or one.name in switches or one.name in plain.rows:
             raise ValueError(f"component {one.name}: there is a group or a switch of this name")
         if both := set(one.parameters) & set(one.state):
             raise ValueError(f"component {one.name}: {both.pop()} is a parameter and a field")
@@ -470,11 +464,12 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
         if fields:
             name_of_class = one.name.title().replace("_", "") + "Group"
             groups[one.name] = _group(name_of_class, Parameters, one.description, fields)
-    plain = _BUILT_IN["effects"]
     if drives:
         row = plain.rows["drive"]
-        known = "; ".join([row.description, *(f"{name}: {of}" for name, of in drives.items())])
-        switches["drive"] = choice(row.default, (*row.choices, *drives), known)
+        told = (f"; {name}: {description}" for name, description in drives.items())
+        switches["drive"] = choice(
+            row.default, (*row.choices, *drives), "".join((row.description, *told))
+        )
     if switches:
         groups["effects"] = _group("Effects", plain, plain.__doc__, switches)
     for key, group in groups.items():

@@ -411,7 +411,7 @@ class Scene:
             "barrier": self.barrier_on,
             "cuttings": self.cuttings_on,
             "rock": self.effects.rock != "none",
-            **{one.name: self[one.switch[0]] is True for one in COMPONENTS if not one.is_drive},
+            **{one.name: self[f"effects.{one.name}"] for one in COMPONENTS if not one.is_drive},
         }
 
     def _string_switches(self) -> dict[str, bool]:

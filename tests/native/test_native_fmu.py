@@ -73,6 +73,7 @@ SCENES = {
     "power law of rigid bodies": {**POWER, "piston.model": "rigid", "bit.model": "rigid"},
     "power law and a string": {**POWER, "string.rods": RODS, "effects.string": True},
     "cuttings": {"effects.cuttings": True},
+    "air": {"effects.drive": "pneumatic", "solver.name": "modal"},
     "damper": {"effects.damper": True, "string.rods": RODS[:1], "effects.string": True},
 }  # fmt: skip
 

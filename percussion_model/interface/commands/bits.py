@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -37,17 +36,12 @@ def bits(
     from percussion_model.scene.bits import bit
     from percussion_model.scene.bits import bits as names
 
-    common.check_json(json_file)
     chosen = [bit(one) for one in (names() if name is None else [name])]
-    common.write_json(
-        json_file, {one.name: asdict(one) | {"parameters": one.parameters} for one in chosen}
-    )
-    if json_file == "-":
-        return
-    if name is None:
-        print_stored(HEADINGS, HEADINGS[:1], map(cells, chosen), NOTE)
-    else:
-        print_table(named_table(details(chosen[0]), chosen[0].title))
+    if not common.told_as_json(json_file, chosen, common.with_parameters):
+        if name is None:
+            print_stored(HEADINGS, HEADINGS[:1], map(cells, chosen), NOTE)
+        else:
+            print_table(named_table(details(chosen[0]), chosen[0].title))
 
 
 def interval_text(one: Number, scale: float = 1.0, digits: int = 3) -> str:

@@ -12,6 +12,7 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
@@ -365,6 +366,26 @@ def write_json(json_file: str | None, values: dict[str, Any]) -> None:
         word = "replaced" if file.is_file() else "wrote"
         if write_file(file, to_json(values) + "\n") == file:
             print(f"{word} {file}", file=sys.stderr)
+
+
+def told_as_json(json_file: str | None, chosen: list[Any], plain: Callable) -> bool:
+    """Write what is stored under names as JSON, and say whether that is all to be told.
+
+    Parameters
+    ----------
+    chosen : list
+        Bits, rocks or hammers.
+    plain : callable
+        Plain values of one.
+    """
+    check_json(json_file)
+    write_json(json_file, {one.name: plain(one) for one in chosen})
+    return json_file == "-"
+
+
+def with_parameters(one: Any) -> dict[str, Any]:
+    """Return a bit or a rock as plain values, with what it is for a scene."""
+    return asdict(one) | {"parameters": one.parameters}
 
 
 # What could not be written where it was asked for, though it is kept elsewhere or only drawn.

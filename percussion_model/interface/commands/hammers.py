@@ -66,16 +66,13 @@ def hammers(
     from percussion_model.interface.tables import named_table, print_stored, print_table
     from percussion_model.scene.hammers.library import stored_hammer, stored_hammers
 
-    common.check_json(json_file)
     chosen = [stored_hammer(one) for one in (stored_hammers() if name is None else [name])]
-    common.write_json(json_file, {one.name: plain(one) for one in chosen})
-    if json_file == "-":
-        return
-    if name is None:
-        print_stored(HEADINGS, LEFT, map(cells, chosen), NOTE)
-    else:
-        rows = ((first, escape(text)) for first, text in details(chosen[0]))
-        print_table(named_table(rows, chosen[0].title))
+    if not common.told_as_json(json_file, chosen, plain):
+        if name is None:
+            print_stored(HEADINGS, LEFT, map(cells, chosen), NOTE)
+        else:
+            rows = ((first, escape(text)) for first, text in details(chosen[0]))
+            print_table(named_table(rows, chosen[0].title))
 
 
 def plain(one: StoredHammer) -> dict[str, Any]:

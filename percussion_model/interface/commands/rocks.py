@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -57,17 +56,12 @@ def rocks(
     from percussion_model.scene.rocks import read_rock, rock
     from percussion_model.scene.rocks import rocks as names
 
-    common.check_json(json_file)
     chosen = [rock(one) for one in names()] if name is None else [read_rock(name)]
-    common.write_json(
-        json_file, {one.name: asdict(one) | {"parameters": one.parameters} for one in chosen}
-    )
-    if json_file == "-":
-        return
-    if name is None:
-        show_rocks(chosen)
-    else:
-        show_rock(chosen[0])
+    if not common.told_as_json(json_file, chosen, common.with_parameters):
+        if name is None:
+            show_rocks(chosen)
+        else:
+            show_rock(chosen[0])
 
 
 def interval_text(one: Number) -> str:

@@ -254,6 +254,7 @@ def new(
     from percussion_model.scene.hammers import hammer as find
     from percussion_model.scene.parameters import read_number
     from percussion_model.scene.scene import Scene
+    from percussion_model.scene.units import has_unit
 
     common.refuse_existing(file, force)
     common.check_file("FILE", file)
@@ -264,7 +265,7 @@ def new(
     elif pressure is not None:
         if hammer is None or rods is not None:
             raise common.refusal("--pressure needs --hammer: one that works down the hole")
-        if not any(sign.isalpha() for sign in pressure.replace("e", "")):
+        if not has_unit(pressure):
             raise common.refusal(f"--pressure {pressure}: needs a unit, as in '24 bar'")
         scene = with_air(hammer, read_number(_SUPPLY, pressure, "--pressure"))
     elif hammer is not None:
