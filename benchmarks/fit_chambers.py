@@ -13,7 +13,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import differential_evolution
 
-import percussion_model.components.pneumatic as gas
+import percussion_model.physics.chambers as gas
+from percussion_model.components.pneumatic import COMPONENT, open_air
 from percussion_model.physics.gas import FREE_AIR
 from percussion_model.physics.kernel import kernel
 from percussion_model.scene.hammers.library import stored_hammer
@@ -45,7 +46,7 @@ SPACE = {
 EDGES = [key for key in SPACE if key.endswith("_edge")]
 DTYPE = np.dtype(
     [("mass_p", "f8"), ("gravity", "f8")]
-    + [(f"pneumatic_{key}", "f8") for key in gas.COMPONENT.parameters]
+    + [(f"pneumatic_{key}", "f8") for key in COMPONENT.parameters]
 )
 
 
@@ -53,7 +54,7 @@ DTYPE = np.dtype(
 def strike(pars, supply, out):
     """Let a piston strike from rest; rows are time, velocity, air, and stroke of a blow."""
     par, n, t, begun, most = pars[0], 0, 0.0, 0.0, 0.0
-    y = gas.started(gas.open_air(par, 0.0), 1e-3, 0.0)
+    y = gas.started(open_air(par, 0.0), 1e-3, 0.0)
     while n < out.shape[0] and t - begun < 0.15:
         span = par.pneumatic_step
         z = gas.go(par, supply, y, gas.flight(span))
@@ -64,7 +65,7 @@ def strike(pars, supply, out):
                 span = min(max(span - z.x / z.v, 1e-7), par.pneumatic_step)
                 z = gas.go(par, supply, y, gas.flight(span))
             begun = t + span
-            out[n, 0], out[n, 1], out[n, 2], out[n, 3] = begun, -z.v, z.used, most
+            out[n, 0], out[n, 1], out[n, 2], out[n, 3] = begun, -z.v, z.done.used, most
             n, most = n + 1, 0.0
             z = gas.started(z.gas, 0.0, -REBOUND * z.v)
         t, y = t + span, z
@@ -87,7 +88,7 @@ def told(name: str, key: str) -> dict[float, float]:
 def run(name: str, values: dict[str, float], blows: int = BLOWS) -> np.ndarray | None:
     """Rate, velocity, free air [m^3/s], stroke and unrest at each pressure; None if it stalls."""
     par, rows = np.zeros(1, DTYPE), []
-    given = {key: row[0] for key, row in gas.COMPONENT.parameters.items()} | values
+    given = {key: row[0] for key, row in COMPONENT.parameters.items()} | values
     par["mass_p"], par["gravity"] = given.pop("mass"), 9.81
     for key, value in given.items():
         par[f"pneumatic_{key}"] = value

@@ -35,8 +35,8 @@ class Tables:
         self.forms = Forms(*map(row, forms, (1, 1, 3, 4, 3, 4, 3)))
         laws = (modal.LAW_SIZES, modal.DASHPOT, modal.LAW_MOVE, modal.ENDS, modal.OUT, modal.INTO,
                 modal.TAKEN, modal.REST, modal.VIEWS, modal.SCANS, modal.SIDES, modal.WAY,
-                modal.OVER, modal.PUSHED)  # fmt: skip
-        self.laws = Laws(*map(row, laws, (1, 1, 4, 3, 3, 3, 3, 2, 4, 4, 4, 2, 3, 3)))
+                modal.OVER, modal.PUSHED, modal.HELD)  # fmt: skip
+        self.laws = Laws(*map(row, laws, (1, 1, 4, 3, 3, 3, 3, 2, 4, 4, 4, 2, 3, 3, 3)))
         self.shape_p, self.move_p = row(modal.SHAPE_P, 2), row(modal.MOVE_P, 3)
 
 

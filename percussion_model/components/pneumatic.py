@@ -14,223 +14,38 @@ made out on the way that the bodies really went, and what was given too little i
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from percussion_model.components import Component
-from percussion_model.physics.gas import AIR, RATIO, flow, reservoir, volume_of
+from percussion_model.physics.chambers import (
+    Ahead,
+    Done,
+    Gas,
+    Way,
+    go,
+    outside,
+    size_of_lower,
+    size_of_upper,
+    started,
+)
+from percussion_model.physics.gas import AIR, RATIO
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Where piston and bit touch, or may, gas is foretold for this share of the usual time.
-SHORTEST = 0.1
-# Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
-STABLE = 1.5
-# Where the stages of a step are, and their shares of it.
-PARTS, SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
-# Most steps of one integration: a volume a thousandth of a usual one needs 1,300.
-MOST_STEPS = 20_000
-# A stop of some stiffness [N/m] leaves about this share of the upper chamber.
-LEAST_SHARE, STOP = 1e-2, 1e8
-# Steps are short by how fast a chamber shrinks, and by how fast a piston swings on its gas.
-SHRINKS, SWINGS = 2.0, 3.0
+SHORTEST, TOUCHING = 0.05, 0.05
+# In flight for so many times that, in steps of it.
+LONGEST = 2.0
 # No volume is empty at the start [Pa].
 LEAST_PRESSURE = 100.0
 # A way foretold to this is the real one but for the work of the difference [m].
 NEAR = 1e-5
+# A bit that goes elsewhere than was foretold makes times shorter, by how far times the time [m s].
+OFF, AGAIN = 1.5e-8, 0.2
+# Over less than this share of a step a velocity of the bit may be that of ringing alone.
+RINGS = 0.3
 # A piston that is faster or slower by this than was foretold has met something [m/s].
 JUMP = 1.0
 # A bit that bounces comes to the piston no faster than this [m/s].
-BOUNCE = 10.0
-# Friction has its full value from some times this speed on [m/s].
-CREEP = 1e-2
-
-
-class Gas(NamedTuple):
-    """Masses [kg] and internal energies [J] of upper and lower chamber and exhaust volume."""
-
-    mass_u: float
-    energy_u: float
-    mass_l: float
-    energy_l: float
-    mass_x: float
-    energy_x: float
-
-
-class Ahead(NamedTuple):
-    """Gas, and what it does on the way."""
-
-    gas: Gas
-    x: float  # piston above the bit [m]
-    v: float  # its velocity, up [m/s]
-    used: float  # air from the supply [kg]
-    impulse: float  # on the piston, down [N s]
-    on_bit: float  # on the bit [N s]
-    work: float  # on the piston's motion relative to the bit [J]
-    rate: float  # of what goes on in it, which steps must be short against [1/s]
-
-
-@inlined
-def started(gas, x, v):
-    """Gas with a piston above the bit, before either has moved."""
-    return Ahead(gas, x, v, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@inlined
-def size_of_upper(par, x):
-    """Volume of the upper chamber [m^3]."""
-    most = par.pneumatic_upper_volume
-    return max(most - par.pneumatic_upper_area * x, LEAST_SHARE * most)
-
-
-@inlined
-def size_of_lower(par, x):
-    """Volume of the lower chamber [m^3]; bars that are pressed together leave it as it is."""
-    return par.pneumatic_lower_volume + par.pneumatic_lower_area * max(x, 0.0)
-
-
-@inlined
-def opened(par, area, way):
-    """Effective area of a port that the piston has passed by a way, and of the leak beside it."""
-    share = min(max(way / par.pneumatic_ramp, 0.0), 1.0)
-    return par.pneumatic_discharge * (area * share + par.pneumatic_leak)
-
-
-@inlined
-def outside(par):
-    """Pressure behind the flushing holes [Pa]."""
-    return par.pneumatic_ambient_pressure + par.pneumatic_back_pressure
-
-
-@kernel
-def rates_of(par, supply, y):
-    """What changes in a second; `x` and `v` as those of a free piston above a bit at rest."""
-    gas, x, v = y.gas, y.x, y.v
-    size_u, size_l = size_of_upper(par, x), size_of_lower(par, x)
-    size_x = par.pneumatic_exhaust_volume
-    upper = volume_of(gas.mass_u, gas.energy_u, size_u)
-    lower = volume_of(gas.mass_l, gas.energy_l, size_l)
-    behind = volume_of(gas.mass_x, gas.energy_x, size_x)
-    air = reservoir(supply, par.pneumatic_supply_temperature)
-    around = reservoir(outside(par), par.pneumatic_ambient_temperature)
-    share = par.pneumatic_discharge
-    to_upper = flow(air, upper, opened(
-        par, par.pneumatic_upper_intake, x - par.pneumatic_upper_intake_edge))  # fmt: skip
-    to_lower = flow(air, lower, opened(
-        par, par.pneumatic_lower_intake, par.pneumatic_lower_intake_edge - x))  # fmt: skip
-    from_upper = flow(upper, behind, opened(
-        par, par.pneumatic_upper_exhaust, par.pneumatic_upper_exhaust_edge - x))  # fmt: skip
-    from_lower = flow(lower, behind, opened(
-        par, par.pneumatic_lower_exhaust, x - par.pneumatic_lower_exhaust_edge))  # fmt: skip
-    across = flow(upper, lower, share * par.pneumatic_leak)
-    past = flow(air, behind, share * par.pneumatic_bypass)
-    out = flow(behind, around, share * par.pneumatic_flushing)
-    wall, cold = par.pneumatic_wall_conductance, par.pneumatic_wall_temperature
-    heat_u = wall * (cold - upper.root * upper.root / AIR)
-    heat_l = wall * (cold - lower.root * lower.root / AIR)
-    area_u, area_l = par.pneumatic_upper_area, par.pneumatic_lower_area
-    grow_l = area_l * v if x >= 0.0 else 0.0
-    grow_u = -area_u * v if area_u * x < (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume else 0.0
-    rubbing = par.pneumatic_friction * v / math.sqrt(v * v + CREEP * CREEP)
-    force = upper.pressure * area_u - lower.pressure * area_l
-    force += rubbing - outside(par) * (area_u - area_l)
-    beyond = x - (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume / area_u
-    force += STOP * max(beyond, 0.0)
-    by_u, by_l = area_u / size_u, area_l / size_l
-    spring = RATIO * max(upper.pressure * area_u * by_u, lower.pressure * area_l * by_l)
-    swings = SWINGS * math.sqrt(max(spring, 0.0) / par.mass_p)
-    fills_u = (to_upper.stiffness + from_upper.stiffness + across.stiffness) / size_u
-    fills_l = (to_lower.stiffness + from_lower.stiffness + across.stiffness) / size_l
-    fills_x = past.stiffness + from_upper.stiffness + from_lower.stiffness + out.stiffness
-    return Ahead(
-        Gas(
-            to_upper.mass - from_upper.mass - across.mass,
-            to_upper.energy - from_upper.energy - across.energy - upper.pressure * grow_u + heat_u,
-            to_lower.mass - from_lower.mass + across.mass,
-            to_lower.energy - from_lower.energy + across.energy - lower.pressure * grow_l + heat_l,
-            past.mass + from_upper.mass + from_lower.mass - out.mass,
-            past.energy + from_upper.energy + from_lower.energy - out.energy,
-        ),
-        v,
-        -force / par.mass_p - par.gravity,
-        to_upper.mass + to_lower.mass + past.mass,
-        force,
-        (lower.pressure - outside(par)) * area_l,
-        -force * v,
-        max(fills_u, fills_l, fills_x / size_x, swings, SHRINKS * abs(v) * max(by_u, by_l)),
-    )
-
-
-@inlined
-def plus(y, rate, h):
-    """What `y` is after a time at a rate."""
-    gas, g = y.gas, rate.gas
-    return Ahead(
-        Gas(
-            gas.mass_u + h * g.mass_u,
-            gas.energy_u + h * g.energy_u,
-            gas.mass_l + h * g.mass_l,
-            gas.energy_l + h * g.energy_l,
-            gas.mass_x + h * g.mass_x,
-            gas.energy_x + h * g.energy_x,
-        ),
-        y.x + h * rate.x,
-        y.v + h * rate.v,
-        y.used + h * rate.used,
-        y.impulse + h * rate.impulse,
-        y.on_bit + h * rate.on_bit,
-        y.work + h * rate.work,
-        rate.rate,
-    )
-
-
-class Way(NamedTuple):
-    """A way of the piston above the bit, by what it is at both ends."""
-
-    known: bool  # else the piston flies
-    x: float  # [m]
-    v: float  # [m/s]
-    then_x: float
-    then_v: float
-    span: float  # [s]
-
-
-@inlined
-def flight(span):
-    """Way of a piston that flies for a time."""
-    return Way(False, 0.0, 0.0, 0.0, 0.0, span)
-
-
-@inlined
-def on_way(way, y, t):
-    """The same gas with the piston where the way has it after a time."""
-    if not way.known:
-        return y
-    d, q = way.span, t / way.span
-    bend = 3.0 * (way.then_x - way.x) - d * (2.0 * way.v + way.then_v)
-    turn = 2.0 * (way.x - way.then_x) + d * (way.v + way.then_v)
-    x = way.x + q * (d * way.v + q * (bend + q * turn))
-    v = way.v + q * (2.0 * bend + 3.0 * q * turn) / d
-    return Ahead(y.gas, x, v, y.used, y.impulse, y.on_bit, y.work, y.rate)
-
-
-@kernel
-def go(par, supply, y, way):
-    """Integrate the gas over a way, or with a piston that flies; classical Runge-Kutta steps."""
-    t, left = 0.0, way.span
-    for _ in range(MOST_STEPS):
-        here, end, h = y, y, 0.0
-        for stage in range(4):
-            rate = rates_of(par, supply, on_way(way, here, t + PARTS[stage] * h))
-            if stage == 0:
-                steps = left * max(1.0 / par.pneumatic_step, rate.rate / STABLE)
-                h = left / max(math.ceil(steps - 1e-9), 1)
-            end = plus(end, rate, SHARES[stage] * h)
-            here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
-        t += h
-        y = on_way(way, end, t)
-        left -= h
-        if left <= 1e-9 * way.span:
-            break
-    return y
+BOUNCE = 5.0
 
 
 @inlined
@@ -247,15 +62,26 @@ def present_gas(s):
 
 
 @inlined
+def note_pressures(par, s, share):
+    """Note pressures at a share of the time foretold, in which energies go straight."""
+    x, rest, each = -s.u_r, 1.0 - share, RATIO - 1.0
+    energy_u = rest * s.pneumatic_energy_u + share * s.pneumatic_then_energy_u
+    energy_l = rest * s.pneumatic_energy_l + share * s.pneumatic_then_energy_l
+    energy_x = rest * s.pneumatic_energy_x + share * s.pneumatic_then_energy_x
+    s.pneumatic_upper_pressure = each * energy_u / size_of_upper(par, x)
+    s.pneumatic_lower_pressure = each * energy_l / size_of_lower(par, x)
+    s.pneumatic_exhaust_pressure = each * energy_x / par.pneumatic_exhaust_volume
+
+
+@inlined
 def keep_gas(par, s, gas):
     """Put gas into the state."""
     s.pneumatic_mass_u, s.pneumatic_energy_u = gas.mass_u, gas.energy_u
     s.pneumatic_mass_l, s.pneumatic_energy_l = gas.mass_l, gas.energy_l
     s.pneumatic_mass_x, s.pneumatic_energy_x = gas.mass_x, gas.energy_x
-    x = -s.u_r
-    s.pneumatic_upper_pressure = (RATIO - 1.0) * gas.energy_u / size_of_upper(par, x)
-    s.pneumatic_lower_pressure = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, x)
-    s.pneumatic_exhaust_pressure = (RATIO - 1.0) * gas.energy_x / par.pneumatic_exhaust_volume
+    s.pneumatic_gas_mass = gas.mass_u + gas.mass_l + gas.mass_x
+    s.pneumatic_gas_energy = gas.energy_u + gas.energy_l + gas.energy_x
+    note_pressures(par, s, 0.0)
 
 
 @inlined
@@ -295,11 +121,25 @@ def corrected(par, s, then, x):
     p_l = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, then.x)
     up, down = p_u * par.pneumatic_upper_area * off, p_l * par.pneumatic_lower_area * off
     given = p_l * (size_of_lower(par, x) - size_of_lower(par, then.x))
+    # off by a part that grows in time
+    by_u = RATIO * up * par.pneumatic_upper_area / size_of_upper(par, then.x)
+    by_l = RATIO * down * par.pneumatic_lower_area / size_of_lower(par, then.x)
+    half = 0.5 * s.pneumatic_span
     gas = Gas(
         gas.mass_u, gas.energy_u + up, gas.mass_l, gas.energy_l - given, gas.mass_x, gas.energy_x
     )
     force = up - down - outside(par) * (par.pneumatic_upper_area - par.pneumatic_lower_area) * off
-    return Ahead(gas, x, then.v, then.used, then.impulse, then.on_bit, then.work - force, then.rate)
+    done = then.done
+    done = Done(
+        done.used,
+        done.vented,
+        done.brought,
+        done.expanded + given - up,
+        done.impulse + half * (by_u + by_l),
+        done.on_bit - half * by_l,
+        done.work - force,
+    )
+    return Ahead(gas, x, then.v, done, then.rate)
 
 
 @inlined
@@ -313,16 +153,16 @@ def foretold(s):
         s.pneumatic_then_mass_x,
         s.pneumatic_then_energy_x,
     )
-    return Ahead(
-        gas,
-        s.pneumatic_then_x,
-        s.pneumatic_then_v,
+    done = Done(
         s.pneumatic_then_used,
+        s.pneumatic_then_vented,
+        s.pneumatic_then_brought,
+        s.pneumatic_then_expanded,
         s.pneumatic_then_impulse,
         s.pneumatic_then_on_bit,
         s.pneumatic_then_work,
-        0.0,
     )
+    return Ahead(gas, s.pneumatic_then_x, s.pneumatic_then_v, done, 0.0)
 
 
 @kernel
@@ -335,21 +175,27 @@ def settle(par, s):
     h, x, before, v_p = s.pneumatic_since, -s.u_r, s.pneumatic_from_x, s.pneumatic_last_v
     bit = (x - before) / h + 0.5 * (s.pneumatic_from_v + v_p)
     then = foretold(s)
+    far = max(abs(x - then.x) * h, LEAST_DIVISOR)
+    s.pneumatic_reach = h * min(math.sqrt(OFF / far), 2.0) if s.closed == 0 else 0.0
     if abs(h - s.pneumatic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
         then = corrected(par, s, then, x)
     else:
         way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h)
         then = go(par, s.pneumatic_supply, started(present_gas(s), before, 0.0), way)
     keep_gas(par, s, then.gas)
-    feed_supply(par, s, then.used, h)
-    s.pneumatic_owed += then.impulse - s.pneumatic_given
-    s.pneumatic_owed_bit += then.on_bit - s.pneumatic_given_bit
+    done = then.done
+    feed_supply(par, s, done.used, h)
+    s.pneumatic_owed += done.impulse - s.pneumatic_given
+    s.pneumatic_owed_bit += done.on_bit - s.pneumatic_given_bit
     s.pneumatic_given = s.pneumatic_given_bit = 0.0
-    s.pneumatic_consumed += then.used
-    s.pneumatic_gas_work += then.work
+    s.pneumatic_consumed += done.used
+    s.pneumatic_vented += done.vented
+    s.pneumatic_brought += done.brought
+    s.pneumatic_expanded += done.expanded
+    s.pneumatic_gas_work += done.work
     s.pneumatic_held_work = s.pneumatic_given_work
-    # over a short time it may be that of ringing alone
-    s.pneumatic_bit_velocity += min(h / par.pneumatic_step, 1.0) * (bit - s.pneumatic_bit_velocity)
+    share = min(h / (RINGS * par.pneumatic_step), 1.0)
+    s.pneumatic_bit_velocity += share * (bit - s.pneumatic_bit_velocity)
     s.pneumatic_span = s.pneumatic_since = 0.0
 
 
@@ -367,16 +213,19 @@ def foretell(par, s, span):
     s.pneumatic_then_mass_l, s.pneumatic_then_energy_l = then.gas.mass_l, then.gas.energy_l
     s.pneumatic_then_mass_x, s.pneumatic_then_energy_x = then.gas.mass_x, then.gas.energy_x
     s.pneumatic_then_x, s.pneumatic_then_v = then.x, s.pneumatic_bit_velocity - then.v
-    s.pneumatic_then_used, s.pneumatic_then_impulse = then.used, then.impulse
-    s.pneumatic_then_on_bit, s.pneumatic_then_work = then.on_bit, then.work
+    done = then.done
+    s.pneumatic_then_used, s.pneumatic_then_vented = done.used, done.vented
+    s.pneumatic_then_brought, s.pneumatic_then_expanded = done.brought, done.expanded
+    s.pneumatic_then_impulse, s.pneumatic_then_on_bit = done.impulse, done.on_bit
+    s.pneumatic_then_work = done.work
     # a force that goes straight with the impulse and the way of the one foretold
-    impulse, slope = then.impulse, 0.0
+    impulse, slope = done.impulse, 0.0
     if s.closed == 0:
         moment = d * impulse + par.mass_p * (then.x - x - d * v + 0.5 * d * d * par.gravity)
         slope = 12.0 * moment / (d * d * d) - 6.0 * impulse / (d * d)
     s.pneumatic_slope = slope
     s.pneumatic_base = (impulse + s.pneumatic_owed) / d - 0.5 * slope * d
-    s.pneumatic_mean_on_bit = (then.on_bit + s.pneumatic_owed_bit) / d
+    s.pneumatic_mean_on_bit = (done.on_bit + s.pneumatic_owed_bit) / d
 
 
 @inlined
@@ -395,7 +244,10 @@ def is_over(s):
 def lasts(par, s):
     """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
     shortest, meet = SHORTEST * par.pneumatic_step, -s.u_r / max(s.v_p - s.v_b, BOUNCE)
-    return shortest if s.closed == 1 else min(max(meet, shortest), par.pneumatic_step)
+    if s.closed == 1:
+        return TOUCHING * par.pneumatic_step
+    most = min(max(s.pneumatic_reach, AGAIN * par.pneumatic_step), LONGEST * par.pneumatic_step)
+    return min(max(meet, shortest), most)
 
 
 @kernel
@@ -408,9 +260,9 @@ def renew(par, s, h):
         s.pneumatic_supply = set_pressure(par, s)
     elif s.pneumatic_since > 0.0:
         settle(par, s)
-    # what is asked for less is held on in steps
+    # what is asked for less is held on in steps, in which a bit that bounces may be anywhere
     is_whole = h >= 0.5 * SHORTEST * par.pneumatic_step
-    foretell(par, s, h if is_whole else lasts(par, s))
+    foretell(par, s, h if is_whole else min(lasts(par, s), 0.5 * par.pneumatic_step))
 
 
 @inlined
@@ -435,6 +287,7 @@ def pass_time(par, s, h):
     s.pneumatic_given_work += s.f_pneumatic_piston * (s.u_r - s.pneumatic_last_u)
     s.pneumatic_last_u, s.pneumatic_last_v = s.u_r, s.v_p
     s.pneumatic_since += h
+    note_pressures(par, s, min(s.pneumatic_since / max(s.pneumatic_span, LEAST_DIVISOR), 1.0))
     if -s.u_r > par.pneumatic_upper_exhaust_edge:
         s.armed = 1
 
@@ -491,7 +344,7 @@ COMPONENT = Component(
                  *_PORT),
         "discharge": (0.7, "-", "C_d: discharge coefficient of all areas", 0.0, 1.0),
         "friction": (24.19, "N", "friction of the piston", 0.0, 1e6),
-        "step": (1.5e-4, "s", "time for which the gas is foretold; shorter is more accurate",
+        "step": (3e-4, "s", "time for which the gas is foretold; shorter is more accurate",
                  1e-7, 1e-3),
         "wall_conductance": (0.0, "W/K", "heat that passes the walls of a chamber", 0.0, 1e6),
         "wall_temperature": (293.15, "K", "temperature of the walls", 100.0, 2000.0),
@@ -508,16 +361,23 @@ COMPONENT = Component(
         "supply": ("Pa", "pressure of the supply", 0.0),
         "air": ("kg/s", "air that the last blow consumed, by its period", 0.0),
         "consumed": ("kg", "air consumed since the start", 0.0),
+        "vented": ("kg", "air that went through the flushing holes since the start", 0.0),
+        "gas_mass": ("kg", "air in the three volumes", 0.0),
+        "gas_energy": ("J", "internal energy of that air", 0.0),
+        "brought": ("J", "energy that came with air and through walls, less what left with air",
+                    0.0),
+        "expanded": ("J", "work of the chambers' pressures as they grow", 0.0),
         "gas_work": ("J", "work of the gas on the piston, relative to the bit, by the gas", 0.0),
         "held_work": ("J", "the same by the forces that solvers took", 0.0),
     },
     hidden=(
         *(f"{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
-        "then_x", "then_v", "then_used", "then_impulse", "then_on_bit", "then_work",
+        "then_x", "then_v", "then_used", "then_vented", "then_brought", "then_expanded",
+        "then_impulse", "then_on_bit", "then_work",
         "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope",
         "mean_on_bit", "given", "given_bit", "given_work", "owed", "owed_bit", "last_u", "last_v",
-        "consumed_before",
+        "consumed_before", "reach",
     ),
     pass_time=pass_time,
     inputs=("supply_pressure", "supply_flow"),

@@ -89,8 +89,8 @@ ROWS, PISTON_ROWS, ROOM = 8, 2, 8
 (
     SIZES, STIFF, SHAPE, MOVE, YIELDS, CHANGE, JOIN,
     LAW_SIZES, DASHPOT, LAW_MOVE, ENDS, OUT, INTO, TAKEN, REST, VIEWS, SCANS, SIDES, WAY, OVER,
-    PUSHED, SHAPE_P, MOVE_P, GAUGE_AT, ROOM_AT, W_AT, WP_AT,
-) = range(27)  # fmt: skip
+    PUSHED, HELD, SHAPE_P, MOVE_P, GAUGE_AT, ROOM_AT, W_AT, WP_AT,
+) = range(28)  # fmt: skip
 
 
 @viewing
@@ -107,7 +107,7 @@ def bars_in(base, moving):
         floats_3(base, d, ENDS), floats_3(base, d, OUT), floats_3(base, d, INTO),
         floats_3(base, d, TAKEN), floats_2(base, d, REST), floats_4(base, d, VIEWS),
         floats_4(base, d, SCANS), floats_4(base, d, SIDES), words_2(base, d, WAY),
-        floats_3(base, d, OVER), floats_3(base, d, PUSHED),
+        floats_3(base, d, OVER), floats_3(base, d, PUSHED), floats_3(base, d, HELD),
     )  # fmt: skip
     return Bars(
         floats_2(moving, d, W_AT), floats_2(moving, d, WP_AT), forms, laws,
@@ -122,7 +122,7 @@ def _tables(made, gauge):
     return (
         forms.sizes, forms.stiff, forms.shape, forms.move, forms.yields, forms.change, forms.join,
         laws.sizes, laws.dashpot, laws.move, laws.ends, laws.out, laws.into, laws.taken, laws.rest,
-        laws.views, laws.scans, laws.sides, laws.way, laws.over, laws.pushed,
+        laws.views, laws.scans, laws.sides, laws.way, laws.over, laws.pushed, laws.held,
         made.shape_p, made.move_p, gauge,
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from percussion_model.physics.kernel import inlined, kernel
+from percussion_model.physics.kernel import inlined
 
 # Gas constant of air [J/(kg K)], and the ratio of its specific heats.
 AIR, RATIO = 287.05, 1.4
@@ -48,9 +48,13 @@ AT_STRAIGHT = math.sqrt(2.0 * RATIO / (RATIO - 1.0) * _POWERS)
 def isentropic(r):
     """Flow function of a ratio of pressures between `CRITICAL` and 1."""
     t = (r - MIDDLE) / HALF
-    y = 0.0
-    for k in range(len(SERIES) - 1, -1, -1):
-        y = y * t + SERIES[k]
+    even = odd = 0.0  # two chains at a time
+    square = t * t
+    for k in range(len(SERIES) - 1, -1, -2):
+        even = even * square + SERIES[k]
+    for k in range(len(SERIES) - 2, -1, -2):
+        odd = odd * square + SERIES[k]
+    y = even + t * odd
     return ROOT_7 * y * y * math.sqrt(max(y * (1.0 - y), 0.0))
 
 
@@ -68,21 +72,23 @@ class Volume(NamedTuple):
     """What orifices see of a volume of gas."""
 
     pressure: float  # [Pa]
-    root: float  # sqrt(R T) [m/s]
+    slow: float  # 1/sqrt(R T) [s/m]
     enthalpy: float  # c_p T [J/kg]
 
 
 @inlined
 def volume_of(mass, energy, size):
     """Look at a mass [kg] with an internal energy [J] in a volume [m^3]."""
-    heat = (RATIO - 1.0) * energy / mass  # R T
-    return Volume((RATIO - 1.0) * energy / size, math.sqrt(heat), RATIO * energy / mass)
+    each = energy / mass
+    return Volume(
+        (RATIO - 1.0) * energy / size, 1.0 / math.sqrt((RATIO - 1.0) * each), RATIO * each
+    )
 
 
 @inlined
 def reservoir(pressure, temperature):
     """A volume so large that it stays as it is."""
-    return Volume(pressure, math.sqrt(AIR * temperature), HEAT * temperature)
+    return Volume(pressure, 1.0 / math.sqrt(AIR * temperature), HEAT * temperature)
 
 
 class Flow(NamedTuple):
@@ -90,18 +96,24 @@ class Flow(NamedTuple):
 
     mass: float  # [kg/s]
     energy: float  # enthalpy [W]
-    stiffness: float  # bound of what either volume changes by its pressure in a second [m^3/s]
 
 
-@kernel
+@inlined
 def flow(one, other, area):
     """Flow through an orifice of an effective area, C_d A [m^2]."""
     high, low, sign = one, other, 1.0
     if one.pressure < other.pressure:
         high, low, sign = other, one, -1.0
-    r = low.pressure / high.pressure
-    by_area = flow_function(r) * area
-    mass = sign * by_area * high.pressure / high.root
-    # the secant to equal pressures, steeper than the flow function
-    stiffness = RATIO * high.root * by_area / max(1.0 - r, 1.0 - STRAIGHT)
-    return Flow(mass, mass * high.enthalpy, stiffness)
+    through = flow_function(low.pressure / high.pressure) * area * high.slow
+    mass = sign * through * high.pressure
+    return Flow(mass, mass * high.enthalpy)
+
+
+@inlined
+def stiffness(flow, one, other):
+    """Bound of what a flow changes in either volume by its pressure in a second [m^3/s].
+
+    By the secant to equal pressures, which is steeper than the flow function.
+    """
+    high, low = max(one.pressure, other.pressure), min(one.pressure, other.pressure)
+    return (RATIO - 1.0) * abs(flow.energy) / max(high - low, (1.0 - STRAIGHT) * high)

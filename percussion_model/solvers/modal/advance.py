@@ -41,9 +41,14 @@ from percussion_model.solvers.modal.bars import (
 from percussion_model.solvers.modal.beside_piston import beside_of, book_way, go_near, present_look
 from percussion_model.solvers.modal.ends import (
     QUIET_SHARE,
+    REST_BIT,
+    REST_LOW,
+    REST_TAKEN,
+    REST_TOP,
     RINGING,
     WHOLE,
     at_rest,
+    besides,
     end_mode,
     end_standstill,
     has_piston,
@@ -52,14 +57,21 @@ from percussion_model.solvers.modal.ends import (
     time_of,
     unpark,
 )
+from percussion_model.solvers.modal.lanes import WIDTH, load, spread, store, total
 from percussion_model.solvers.modal.next_event import search
 from percussion_model.solvers.modal.pairs import (
     AT,
     FIRST_STRIDE,
+    PLOAD,
     PQ,
+    PV,
+    SHAPE_BIT,
+    book_losses,
     drop_pairs,
     drop_tiny,
     energy_about_rest,
+    enough_pairs,
+    hold_ends,
     keep,
     law_wanted,
     leave_out_pairs,
@@ -127,13 +139,48 @@ def hold_on(par, s):
     return s.held_until - s.time
 
 
+@kernel
+def change_load(par, s, bars, a_b):
+    """Go on by the pairs of a bit alone about where another load would hold it."""
+    laws, w, n = bars.laws, bars.w, bars.laws.sizes[s.law]
+    quiet, change = QUIET_SHARE * barrier_level(par, s), a_b - s.a_b
+    if s.mode == Mode.SS and s.vibrates > quiet:
+        book_losses(s, bars)  # which tells what is left
+    energy = s.vibrates + besides(s, bars)
+    s.a_b = a_b
+    if s.form == 0:
+        w[PLOAD, 0] = bars.forms.shape[0, SHAPE_BIT, 0] * a_b
+    else:
+        held, rest, taken = laws.held[s.law], laws.rest[s.law], spread(0.0)
+        for k in range(s.pairs, n, WIDTH):
+            store(w, PQ, k, spread(0.0))
+            store(w, PV, k, spread(0.0))
+        for k in range(0, n, WIDTH):
+            q, v = load(w, PQ, k), load(w, PV, k)
+            taken = taken + load(held, 2, k) * q + load(held, 3, k) * v
+            store(w, PQ, k, q - load(held, 0, k) * change)
+            store(w, PV, k, v - load(held, 1, k) * change)
+        s.takes += change * (change * rest[REST_TAKEN] - total(taken))
+        s.rest_low, s.rest_top = rest[REST_LOW] * a_b, rest[REST_TOP] * a_b
+        s.rest_b = rest[REST_BIT] * a_b
+        s.vibrates = energy - besides(s, bars)
+        s.pairs = n
+        s.pairs = enough_pairs(par, s, bars)
+        hold_ends(par, s, bars)
+    s.stride = FIRST_STRIDE
+    s.alert = 1 if s.vibrates > quiet else 0
+
+
 @merged
 def take_loads(par, s, bars):
-    """Take the forces on the bodies; pairs under others are given up."""
+    """Take the forces on the bodies; pairs of bars that touch are given up under others."""
     push = drive_force(par, s)
     a_p = piston_acceleration(par, push) if has_piston(par) else 0.0
     a_b = bit_acceleration(par, s)
-    if s.law >= 0 and (a_b != s.a_b or (s.closed == 1 and a_p != s.a_p)):
+    if s.law >= 0 and s.closed == 0:
+        if a_b != s.a_b:
+            change_load(par, s, bars, a_b)
+    elif s.law >= 0 and (a_b != s.a_b or a_p != s.a_p):
         drop_pairs(par, s, bars)
         s.alert = 1
     if s.law < 0:

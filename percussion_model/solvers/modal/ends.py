@@ -93,7 +93,7 @@ AT_REST = 1e-5
 CHECKPOINT = 64
 # A standstill with less than this share of W_R stays one if nothing comes from outside.
 QUIET_SHARE = 0.9
-REST_LOW, REST_TOP, REST_BIT = (int(row) for row in Rest)
+REST_LOW, REST_TOP, REST_BIT, REST_TAKEN = (int(row) for row in Rest)
 
 
 @inlined

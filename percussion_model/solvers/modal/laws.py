@@ -260,6 +260,19 @@ def _over(forms, sizes, out, into):
 
 
 @plain
+def _fill_held(pairs, loads, rows):
+    """Fill a table of `Laws.held`, by what `_rest` tells; what is taken from there on."""
+    n = rows.shape[1]
+    at = _product(np.ascontiguousarray(pairs.into[: len(loads)].T), loads)
+    twice = 2.0 * _product(pairs.taken, at)
+    rows[0], rows[1], rows[2], rows[3] = at[:n], at[n:], twice[:n], twice[n:]
+    whole = 0.0
+    for k in range(len(at)):
+        whole += 0.5 * at[k] * twice[k]
+    return whole
+
+
+@plain
 def _pairs_of(shape, held, dashpot, eta):
     """Pairs of a law: of a free form its modes, else damped modes, none where there are none."""
     n, stiff = shape.shape[1], shape[Shape.STIFF]
@@ -297,6 +310,7 @@ def laws_of(forms, dashpot, eta, tick):
     views = np.zeros((2 * JOINED, LONGEST_HOP + 1, VIEWS, alone))
     scans = np.zeros((count, hops, most * VIEWS, SCAN))
     sides, rest = np.zeros_like(scans), np.zeros((2 * JOINED, RESTS))
+    held_by = np.zeros((2 * JOINED, 4, alone))
     for law in range(count):
         form, damped = law // 2, law % 2 == 1
         n, held = forms.sizes[form], forms.stiff[form]
@@ -320,10 +334,13 @@ def laws_of(forms, dashpot, eta, tick):
             other, loads = End.TOP.value, _rest(shape)
             for row, place in ((Rest.LOW, Shape.LOW), (Rest.TOP, Shape.TOP), (Rest.BIT, Shape.BIT)):
                 rest[law, row] = _product(shape[place : place + 1], loads)[0]
+            if held > 0.0:
+                rest[law, Rest.TAKEN] = _fill_held(pairs, loads, held_by[law])
             _fill_views(square, decay, tick, own, views[law])
         _fill_scans(square, decay, tick, own, End.LOW.value, End.SPEED.value, scans[law])
         _fill_scans(square, decay, tick, own, other, End.PISTON_SPEED.value, sides[law])
     way, over, pushed = _over(forms, sizes, out, into)
     return Laws(
-        sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, way, over, pushed
-    )
+        sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, way, over, pushed,
+        held_by,
+    )  # fmt: skip

@@ -129,6 +129,9 @@ class Laws(NamedTuple):
         As `into`.
     pushed : ndarray, shape (tables, 2, n)
         What an acceleration of the bit by its loads of 1 m/s2 adds, since it shifts the rest.
+    held : ndarray, shape (6, 4, n)
+        Where such loads hold the pairs, Q and V; and twice what the form `taken` makes of these
+        and of each number.
     """
 
     sizes: np.ndarray
@@ -145,6 +148,7 @@ class Laws(NamedTuple):
     way: np.ndarray
     over: np.ndarray
     pushed: np.ndarray
+    held: np.ndarray
 
 
 class Go(IntEnum):
@@ -180,6 +184,7 @@ class Rest(IntEnum):
     LOW = 0  # rock end [m]
     TOP = 1  # top of the bit
     BIT = 2  # integral over the mass of the bit [kg m]
+    TAKEN = 3  # what a dashpot of 1 N s/m would take from there on [J]
 
 
 class View(IntEnum):
