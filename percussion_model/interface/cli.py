@@ -34,6 +34,7 @@ from percussion_model.interface.commands.common import (
 )
 from percussion_model.interface.commands.compare import compare
 from percussion_model.interface.commands.couple import couple
+from percussion_model.interface.commands.drive_map import drive_map
 from percussion_model.interface.commands.effects import effects
 from percussion_model.interface.commands.explore import explore
 from percussion_model.interface.commands.hammers import hammers
@@ -173,6 +174,7 @@ for _command in (
     rocks,
     bits,
     hammers,
+    drive_map,
 ):
     add(_command)
 add(explore, waits=True)
