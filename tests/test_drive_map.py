@@ -12,15 +12,17 @@ from typer.testing import CliRunner
 from percussion_model import Scene, SceneError, settled
 from percussion_model.analysis.drive_map import (
     IN_ROCK,
+    LAW,
     LEFT_OUT,
     blow_row,
     drive_map,
     law_cycle,
     law_of,
     on_a_wall,
+    settled_row,
 )
 from percussion_model.interface.cli import app
-from percussion_model.scene.hammers import with_air
+from percussion_model.scene.hammers import CHAMBERS, with_air
 
 BAR = 1e5
 
@@ -93,6 +95,31 @@ def test_rows_are_left_out_between_others_alone(found):
     assert [row[name] for name in LEFT_OUT] == pytest.approx(off, rel=1e-9)
     assert found.law(18 * BAR, 0.1) == (row["force"], row["reversal_distance"])
     assert found.law(15 * BAR, 0.1)[0] == pytest.approx(0.5 * (below["force"] + row["force"]))
+
+
+@pytest.mark.parametrize("name", CHAMBERS)
+def test_hammers_with_air_have_the_law_that_stands_for_their_chambers(name):
+    """Between stored pressures, at the rebound of their rock."""
+    scene = with_air(name, 21 * BAR)
+    row = blow_row(scene, float(settled_row(scene)["rebound"]))
+    law = scene.drive.force, scene.drive.reversal_distance
+    assert law == pytest.approx([float(row[key]) for key in LAW], rel=5e-3)
+    assert with_air(name, 50 * BAR).drive.force > 1.4 * with_air(name, 35 * BAR).drive.force
+
+
+def test_a_hammer_set_back_to_the_law_goes_on_as_with_its_chambers():
+    by_air = with_air("dth5", 24 * BAR)
+    air, law = (
+        settled_row(by_air.replace(**{"effects.drive": d})) for d in ("pneumatic", "pressure")
+    )
+    for name, bound in (("frequency", 0.01), ("blow_energy", 0.03), ("rate", 0.05)):
+        assert law[name] == pytest.approx(air[name], rel=bound)
+
+
+@pytest.mark.parametrize("pressure", [-1e5, 3e7])
+def test_a_pressure_out_of_bounds_is_refused_by_its_name(pressure):
+    with pytest.raises(SceneError, match=r"pneumatic.supply_pressure = "):
+        with_air("dth5", pressure)
 
 
 def test_pressures_at_which_blows_die_out_have_no_law():

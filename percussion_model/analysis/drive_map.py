@@ -17,6 +17,8 @@ from percussion_model.analysis.stationary import settled
 from percussion_model.scene.drive_calibration import calibrate_drive
 from percussion_model.scene.scene import Scene, SceneError
 
+__all__ = ["DriveMap", "drive_map"]
+
 # Rebounds, and pressures by that of the scene, where no others are asked for.
 REBOUNDS, PRESSURES = (0.1, 0.3, 0.5), (0.25, 0.5, 0.75, 1.0, 1.25)
 SUPPLY = "pneumatic.supply_pressure"
@@ -96,7 +98,7 @@ def drive_map(
         [blow_row(scene.replace(**{SUPPLY: pressure}), rebound) for rebound in across]
         for pressure in columns
     ])  # fmt: skip
-    own = np.array([_told(scene.replace(**{SUPPLY: pressure})) for pressure in columns])
+    own = np.array([settled_row(scene.replace(**{SUPPLY: pressure})) for pressure in columns])
     for k, row in enumerate(own):
         row["force"], row["reversal_distance"] = _between(rows, row["pressure"], row["rebound"])
         for n, one in enumerate((*rows[k], row)):
@@ -116,7 +118,7 @@ def on_a_wall(scene: Scene, rebound: float) -> Scene:
 
 def blow_row(scene: Scene, rebound: float) -> np.ndarray:
     """ROW of the chambers at the scene's pressure over a bit at rest, with their law."""
-    row = _told(on_a_wall(scene, rebound))
+    row = settled_row(on_a_wall(scene, rebound))
     if row["frequency"] > 0.0:
         told = (float(row["impact_velocity"]), rebound, 1.0 / float(row["frequency"]))
         row["force"], row["reversal_distance"] = law_of(*_body(scene), *told)
@@ -160,7 +162,7 @@ def _body(scene: Scene) -> tuple[float, float]:
     return mass, mass * scene.gravity.acceleration if scene.effects.gravity else 0.0
 
 
-def _told(scene: Scene) -> np.ndarray:
+def settled_row(scene: Scene) -> np.ndarray:
     """What the settled motion of a scene tells of a ROW; all else, and of none, is NaN."""
     row, found = np.full((), math.nan, ROW), settled(scene, scatter=SCATTER)
     row["pressure"] = scene[SUPPLY]
@@ -178,7 +180,7 @@ def _run_by_law(scene: Scene, row: np.ndarray, chambers: np.ndarray) -> None:
     """Put into a row what its law is off by in the scene's rock."""
     if row["force"] > 0.0:
         law = {f"drive.{name}": float(row[name]) for name in LAW}
-        found = _told(scene.replace(**{"effects.drive": "pressure", **law}))
+        found = settled_row(scene.replace(**{"effects.drive": "pressure", **law}))
         for name, of in IN_ROCK.items():
             row[name] = found[of] / chambers[of] - 1.0
 

@@ -61,6 +61,8 @@ def hammer(name: str, rods: int | None = None) -> Scene:
 def with_air(name: str, pressure: float) -> Scene:
     """Return the scene of a hammer that air drives, in chambers fitted to a catalogue.
 
+    With `effects.drive = "pressure"` it has the pressure law that stands for them.
+
     Parameters
     ----------
     name : str
@@ -82,8 +84,22 @@ def with_air(name: str, pressure: float) -> Scene:
     numbers = read_toml(_HERE / "chambers" / f"{CHAMBERS[name]}.toml")["pneumatic"]
     changes = {f"pneumatic.{key}": value for key, value in numbers.items()}
     changes["pneumatic.supply_pressure"] = pressure
-    law = {"drive.force": None, "drive.reversal_distance": None}
-    return scene.replace(**{"effects.drive": "pneumatic", **law, **changes})
+    return scene.replace(**{"effects.drive": "pneumatic", **_law(name, pressure), **changes})
+
+
+def _law(name: str, pressure: float) -> dict[str, float]:
+    """Pressure law straight between those that are stored; beyond them F_0 goes with pressure."""
+    from numpy import interp
+
+    rows = read_toml(_HERE / "chambers" / "laws.toml")[name]
+    known = min(max(pressure, rows["pressure"][0]), rows["pressure"][-1])
+    force, distance = (
+        float(interp(known, rows["pressure"], rows[key])) for key in ("force", "reversal_distance")
+    )
+    return {
+        "drive.force": round(force * max(pressure, 0.0) / known, 1),
+        "drive.reversal_distance": round(distance, 6),
+    }
 
 
 def bar_test() -> Scene:
