@@ -16,7 +16,7 @@ from percussion_model.interface.plotting.window import StressField, peak_stresse
 from percussion_model.interface.report import headline_rows, mean_cards
 from percussion_model.interface.terminal import show_settled, show_summary
 from percussion_model.physics.records import BLOW
-from percussion_model.scene.hammers import hammer, hammers
+from percussion_model.scene.hammers import hammer, hammers, with_air
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_numbers
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 
@@ -188,3 +188,64 @@ def test_an_fmu_knows_the_hole():
     starts = {one.name: one.start for one in hammer_variables(Scene(hole_diameter=HOLE))}
     assert starts["hole_diameter"] == HOLE
     assert {one.name: one.start for one in hammer_variables(Scene())}["hole_diameter"] == 0.0
+
+
+# ------------------------------------------------------------------- chambers of air
+
+
+@pytest.fixture(scope="module")
+def on_air():
+    return simulate(with_air("dth5", 24e5).computed_by("rigid"), 1.0, settle=0.5)
+
+
+def test_power_and_efficiency_of_air_are_those_of_the_blows(on_air):
+    summary, blows = on_air.summary(), on_air.counted
+    mass, time = on_air.scene.piston.mass, float(blows["period"].sum())
+    before = 0.5 * mass * float((blows["impact_velocity"] ** 2).sum()) / time
+    after = 0.5 * mass * float((blows["rebound_velocity"] ** 2).sum()) / time
+    air = float((blows["pneumatic_air"] * blows["period"]).sum()) / time
+    assert summary["percussive_power"] == pytest.approx(before, rel=1e-12)
+    assert summary["net_percussive_power"] == pytest.approx(before - after, rel=1e-12)
+    # reversible expansion at the temperature of the surroundings: p V ln of the ratio
+    volume = air * 287.05 * 293.15 / 101325.0
+    power = 101325.0 * volume * math.log(1.0 + on_air.hammer_pressure / 101325.0)
+    assert summary["air_efficiency"] == pytest.approx(before / power, rel=1e-9)
+    assert 0.2 < summary["air_efficiency"] < 0.4
+    assert summary["hammer_pressure"] == pytest.approx(24e5, rel=1e-3)
+
+
+def test_a_run_on_air_tells_it_in_words_of_drillers(on_air, capsys):
+    show_summary(on_air)
+    shown = capsys.readouterr().out
+    summary = on_air.summary()
+    for name, number, unit in (
+        ("Pressure at the hammer", 24.0, "bar, at the end"),
+        (r"Free air \(0 °C, 1 atm\)", summary["pneumatic_air"] * 60.0 / 1.2923, "m³/min"),
+        ("Percussive power", summary["percussive_power"] / 1e3, "kW"),
+        ("Power less the rebound", summary["net_percussive_power"] / 1e3, "kW"),
+        ("Percussive power by air power", 100.0 * summary["air_efficiency"], "%"),
+    ):
+        row = re.search(rf"│ {name} +│ +([\d.]+)[^│]*│ {unit} *│", shown)
+        assert float(row[1]) == pytest.approx(number, rel=5e-3), name
+    told = {name: other for name, _, other in headline_rows(summary)}
+    assert told["Percussive power less the rebound"].endswith("kW")
+    assert told["Pressure at the hammer, at the end"] == "≈24.0 bar"
+
+
+def test_without_chambers_nothing_is_told_of_air(result):
+    summary = result.summary()
+    for key in ("hammer_pressure", "net_percussive_power", "energy_per_air", "air_efficiency"):
+        assert summary[key] is None
+        assert key not in summary["errors"]
+
+
+def test_hammers_on_air_are_told_to_be_starved_or_to_have_stalled():
+    scene = with_air("dth5", 24e5).computed_by("rigid", **{"run.error_estimate": False})
+    small = {"pneumatic.supply_flow": 0.3, "pneumatic.supply_volume": 0.01}
+    starved = simulate(scene.replace(**small), 2.0)
+    assert [text for text in starved.warnings if text.startswith("the hammer is starved")]
+    assert starved.hammer_pressure < 20e5
+    # between the edges of both intakes, with no way out of it
+    rest = {"start.gap": 0.047, "start.piston_velocity": 0.0, "effects.gravity": False}
+    stalled = simulate(scene.replace(**rest, **{"pneumatic.leak": 0.0}), 0.5)
+    assert any(text.startswith("the hammer has stalled: no whole") for text in stalled.warnings)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from percussion_model import Scene, SceneError, settled
+from percussion_model import Scene, SceneError, settled, simulate
 from percussion_model.analysis.drive_map import (
     IN_ROCK,
     LAW,
@@ -114,6 +114,16 @@ def test_a_hammer_set_back_to_the_law_goes_on_as_with_its_chambers():
     )
     for name, bound in (("frequency", 0.01), ("blow_energy", 0.03), ("rate", 0.05)):
         assert law[name] == pytest.approx(air[name], rel=bound)
+
+
+def test_the_law_that_stands_by_is_not_told_to_be_given_in_vain():
+    scene = with_air("dth5", 24 * BAR)
+    assert set(scene.unused) == {"drive.force", "drive.reversal_distance"}
+    assert not any("without effect" in text for text in simulate(scene, 0.1).warnings)
+    alone = Scene().replace(**{"effects.drive": "pneumatic", "drive.force": 5e3})
+    assert any("effect in this scene: drive.force" in t for t in simulate(alone, 0.1).warnings)
+    none = scene.replace(**{"effects.drive": "none", "drive.force": 5e3})
+    assert "drive.force" in none.given_in_vain
 
 
 @pytest.mark.parametrize("pressure", [-1e5, 3e7])

@@ -23,6 +23,7 @@ from percussion_model.interface.plotting.window import (
     last_blow,
     peak_stresses,
 )
+from percussion_model.physics.gas import FREE_AIR
 from percussion_model.scene.parameters import HOLE_DIAMETER, find_row, parameter_table
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
@@ -85,6 +86,10 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     ("standstill_bit_force", "Bit force at standstill", "N", "kN", 1e3),
     ("mean_bit_force", "Mean bit force", "N", "kN", 1e3),
     ("mean_contact_force", "Mean contact force", "N", "kN", 1e3),
+    ("hammer_pressure", "Pressure at the hammer, at the end", "Pa", "bar", 1e5),
+    ("pneumatic_air", "Air (free air at 0 °C, 1 atm)", "kg/s", "m³/min", FREE_AIR / 60.0),
+    ("net_percussive_power", "Percussive power less the rebound", "W", "kW", 1e3),
+    ("air_efficiency", "Percussive power by air power", "–", "%", 1e-2),
 )
 
 # Those that are errors themselves; below this they are rounding [SI].

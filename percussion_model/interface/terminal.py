@@ -60,6 +60,8 @@ SHOWN = (
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
     ("Free air (0 °C, 1 atm)", "pneumatic_air", 60.0 / FREE_AIR, "m³/min"),
+    ("Power less the rebound", "net_percussive_power", 1e-3, "kW"),
+    ("Percussive power by air power", "air_efficiency", 100.0, "%"),
 )
 # A smaller relative error of the wave speed is rounding.
 LEAST_MISFIT = 1e-6
@@ -106,6 +108,9 @@ def show_summary(result: Result) -> None:
         if share is not None:
             table.add_row(f"Energy ledger: {key}", f"{share:.2g}", "of input")
     table.add_section()
+    if summary["hammer_pressure"] is not None:
+        pressure = in_digits(1e-5 * summary["hammer_pressure"])
+        table.add_row("Pressure at the hammer", pressure, "bar, at the end")
     table.add_row("Simulated", f"{result.duration:.6g}", "s")
     if result.scene.piston.model != "absent":
         after = f"{len(result.counted)} counted"

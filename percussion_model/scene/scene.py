@@ -54,6 +54,10 @@ LONGEST_TITLE = 1000
 _DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
 
+# Keys of the pressure law.
+LAW = ("drive.force", "drive.reversal_distance")
+
+
 @dataclass(frozen=True, init=False)
 class Scene:
     """Everything that a run needs to know; immutable.
@@ -296,8 +300,13 @@ class Scene:
 
     @property
     def given_in_vain(self) -> tuple[str, ...]:
-        """Those of `unused` that had no effect either before `computed_by` changed the solver."""
-        return tuple(key for key in self.unused if key not in self._set_aside)
+        """Those of `unused` that had no effect either before `computed_by` changed the solver.
+
+        A whole pressure law beside a drive of another kind is there to be set back to.
+        """
+        found = tuple(key for key in self.unused if key not in self._set_aside)
+        is_law = set(LAW) <= set(found) and self.effects.drive not in ("none", "external")
+        return tuple(key for key in found if not (is_law and key in LAW))
 
     def row_of(self, key: str) -> ParameterRow:
         """Row of a dotted key in the parameter table."""

@@ -50,12 +50,25 @@ SUMMARY_COLUMNS = (
     Column("mean_contact_force", "N", "impulse of the contact force divided by time"),
     Column("percussive_power", "W", "blow energy times blow frequency, of sums"),
     Column("energy_per_advance", "J/m", "blow energy divided by the advance of the hole, of sums"),
+    Column("net_percussive_power", "W", "the same less the rebound; none without chambers"),
+    Column("energy_per_air", "J/kg", "blow energy divided by the air consumed, of sums"),
     Column("peak_bit_force", "N", "greatest bit force of the counted blows"),
     Column("peak_contact_force", "N", "greatest elastic contact force of the counted blows"),
     Column(
         "specific_energy",
         "J/m^3",
         "blow energy divided by the volume drilled, a hole of `hole_diameter`; none without it",
+    ),
+    Column(
+        "hammer_pressure",
+        "Pa",
+        "pressure of the supply at the end, above that of the surroundings; none without chambers",
+    ),
+    Column(
+        "air_efficiency",
+        "",
+        "percussive power divided by that of the air at this pressure, m R T ln(p/p_a) of what "
+        "is consumed, with pressure and temperature of the surroundings",
     ),
     Column("standard_errors", "as above", "errors of these numbers from the scatter of the blows"),
     Column("errors", "as above", "estimated numerical errors of these numbers, scatter included"),

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from percussion_model.physics.gas import AIR
 from percussion_model.physics.records import BLOW_COLUMNS
 from percussion_model.simulation.rate import LEAST_BLOWS, ratios_of_sums
 
@@ -34,6 +35,8 @@ _RATIOS = {
     "mean_contact_force": ("contact_impulse", "period"),
     "percussive_power": ("blow_energy", "period"),
     "energy_per_advance": ("blow_energy", "hole_advance"),
+    "net_percussive_power": ("net_energy", "time_on_air"),
+    "energy_per_air": ("blow_energy", "air_used"),
 }
 # The greatest of all blows.
 _GREATEST = ("peak_bit_force", "peak_contact_force")
@@ -43,6 +46,19 @@ _STRETCHES = 1 / 16, 1 / 8, 1 / 4
 # A greatest value is one that so many blows come near to: those of a cycle do, those of
 # aperiodic motion do not.
 _NEAR_GREATEST = 0.1
+
+
+def _column(blows: np.ndarray, name: str) -> np.ndarray:
+    """A column of the blow table, or what is made of some of it."""
+    if name == "net_energy":  # less what the piston has after the blow
+        before, after = blows["impact_velocity"], blows["rebound_velocity"]
+        share = np.divide(after, before, out=np.zeros(len(blows)), where=before != 0.0)
+        return np.asarray(blows["blow_energy"] * (1.0 - share * share))
+    if name == "time_on_air":  # without chambers there is none, and nothing is told
+        return np.where(blows["pneumatic_air"] > 0.0, blows["period"], 0.0)
+    if name == "air_used":
+        return np.asarray(blows["pneumatic_air"] * blows["period"])
+    return np.asarray(blows[name])
 
 
 def numbers_over(blows: np.ndarray) -> dict[str, float]:
@@ -91,6 +107,32 @@ def by_volume(numbers: Mapping[str, float], diameter: float | None) -> dict[str,
     return {"specific_energy": numbers["energy_per_advance"] / (0.25 * math.pi * diameter**2)}
 
 
+def air_work(pressure: float, ambient: float, temperature: float) -> float:
+    """Most work that compressed air can do in the surroundings, R T ln(p/p_a) [J/kg].
+
+    By expansion at their temperature: the pneumatic power of Y. Shi, M. Cai, W. Xu, Y. Wang,
+    Chin. J. Mech. Eng. 32 (2019) 42, by mass.
+
+    Parameters
+    ----------
+    pressure : float
+        Above that of the surroundings [Pa].
+    ambient, temperature : float
+        Of the surroundings [Pa], [K].
+    """
+    return AIR * temperature * math.log1p(pressure / ambient) if ambient > 0.0 else math.inf
+
+
+def by_air(numbers: Mapping[str, float], work: float) -> dict[str, float]:
+    """Efficiency of air: `energy_per_air` by the work that air can do [J/kg], or the error of both.
+
+    Empty where it is not known.
+    """
+    if not (0.0 < work < math.inf and "energy_per_air" in numbers):
+        return {}
+    return {"air_efficiency": numbers["energy_per_air"] / work}
+
+
 def scatter_over(blows: np.ndarray) -> dict[str, float]:
     """Return the standard errors of the numbers over some blows, SI units.
 
@@ -116,8 +158,8 @@ def scatter_over(blows: np.ndarray) -> dict[str, float]:
     }
     pairs = {name: (blows[column], ones) for name, column in means.items()}
     for name, (column, by) in _RATIOS.items():
-        if float(np.sum(blows[by])) > 0.0:
-            pairs[name] = blows[column], blows[by]
+        if float(np.sum(_column(blows, by))) > 0.0:
+            pairs[name] = _column(blows, column), _column(blows, by)
     values, weights = (np.array(series) for series in zip(*pairs.values(), strict=True))
     _, errors = ratios_of_sums(values, weights, _STRETCHES)
     found = dict(zip(pairs, errors.tolist(), strict=True))
@@ -157,5 +199,5 @@ def _scatter_of_greatest(values: np.ndarray) -> float:
 
 
 def _ratio(blows: np.ndarray, name: str, by: str) -> float:
-    below = float(np.sum(blows[by]))
-    return float(np.sum(blows[name])) / below if below > 0 else math.nan
+    below = float(np.sum(_column(blows, by)))
+    return float(np.sum(_column(blows, name))) / below if below > 0 else math.nan

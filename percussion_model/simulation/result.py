@@ -29,7 +29,13 @@ from percussion_model.simulation.files import (
     staged,
     to_json,
 )
-from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
+from percussion_model.simulation.means import (
+    air_work,
+    by_air,
+    by_volume,
+    numbers_over,
+    scatter_over,
+)
 from percussion_model.simulation.origin import ORIGIN
 from percussion_model.simulation.rate import has_stalled, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
@@ -212,6 +218,14 @@ class Result:
         return numbers_over(self.counted)["mean_contact_force"]
 
     @property
+    def hammer_pressure(self) -> float:
+        """Pressure of the supply of chambers at the end, above the surroundings [Pa]; else NaN."""
+        if self.scene.effects.drive != "pneumatic":
+            return math.nan
+        ambient = self.scene["pneumatic.ambient_pressure"]
+        return float(self.end.get("pneumatic_supply", math.nan) - ambient)
+
+    @property
     def fall(self) -> dict[str, float]:
         """How a bit fell that nothing has struck: a drop test. Empty where there are blows.
 
@@ -245,8 +259,15 @@ class Result:
         forces the greatest of them; None is what is not defined. `driller_numbers` has some
         of them once more, each with its unit, its error and its definition.
         """
-        over_blows, hole = numbers_over(self.counted), self.scene.hole_diameter
-        standard_errors = self.standard_errors
+        over_blows, hole, air = numbers_over(self.counted), self.scene.hole_diameter, math.nan
+        if self.hammer_pressure > 0.0:
+            names = (f"pneumatic.ambient_{name}" for name in ("pressure", "temperature"))
+            air = air_work(self.hammer_pressure, *(self.scene[name] for name in names))
+
+        def with_more(of_blows: dict[str, float]) -> dict[str, float]:
+            return of_blows | by_volume(of_blows, hole) | by_air(of_blows, air)
+
+        more = {"specific_energy": None, "air_efficiency": None} | with_more(over_blows)
         numbers = {
             "rate_of_penetration": self.rate_of_penetration,
             "rate_of_penetration_standard_error": self.rate_of_penetration_standard_error,
@@ -257,9 +278,11 @@ class Result:
             "rate_of_penetration_fixed_window": self.rate_of_penetration_fixed_window,
             "rate_of_penetration_fixed_window_error": self.rate_of_penetration_fixed_window_error,
             **over_blows,
-            "specific_energy": by_volume(over_blows, hole).get("specific_energy"),
-            "standard_errors": standard_errors | by_volume(standard_errors, hole),
-            "errors": self.errors | by_volume(self.errors, hole),
+            "specific_energy": more["specific_energy"],
+            "hammer_pressure": self.hammer_pressure,
+            "air_efficiency": more["air_efficiency"],
+            "standard_errors": with_more(self.standard_errors),
+            "errors": with_more(self.errors),
             "energy": self.energy,
             "blows": len(self.blows),
             "blows_after_settling": len(self.counted),

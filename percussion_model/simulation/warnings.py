@@ -34,9 +34,11 @@ from percussion_model.simulation.validity import (
 MOST_WAVE_SPEED_ERROR = 1e-3
 # A rotation that is slower does not turn [rad/s].
 STANDING = 1e-2
-# Entries of the ledger that put energy in.
 # A supply below this share of what it is set to is starved.
 STARVED = 0.95
+# No hammer takes so long for a blow [s].
+SLOWEST = 0.4
+# Entries of the ledger that put energy in.
 _FLOWS = ("initial", "drive", "feed", "gravity")
 
 
@@ -124,7 +126,11 @@ def _about_blows(result: Result) -> Iterator[str]:
     if result.scene.piston.model == "absent":
         yield "there is no piston, so there are no blows: the rate of penetration is undefined"
     elif len(result.blows) == 0:
-        yield "no whole blow in this run: the rate of penetration is undefined"
+        stalled = result.scene.effects.drive == "pneumatic" and result.duration > SLOWEST
+        yield (
+            "the hammer has stalled: " * stalled
+            + "no whole blow in this run: the rate of penetration is undefined"
+        )
     elif result.has_stalled:
         yield (
             f"the hammer has stalled: no blow ended after {in_digits(end_of(result.blows))} s of "
@@ -154,15 +160,14 @@ def _about_blows(result: Result) -> Iterator[str]:
 
 def _about_supply(result: Result) -> Iterator[str]:
     """Say that a hammer is starved of air."""
-    scene = result.scene
-    if scene.effects.drive != "pneumatic" or not result.end:
+    if result.scene.effects.drive != "pneumatic":
         return
-    set_to = scene["pneumatic.supply_pressure"]
-    found = result.end["pneumatic_supply"] - scene["pneumatic.ambient_pressure"]
+    set_to, found = result.scene["pneumatic.supply_pressure"], result.hammer_pressure
     if found < STARVED * set_to:
         yield (
-            f"the compressor gives too little air (pneumatic.supply_flow): the supply has fallen "
-            f"to {in_digits(found / 1e5)} bar, where {in_digits(set_to / 1e5)} bar are set"
+            "the hammer is starved: the compressor gives too little air (pneumatic.supply_flow), "
+            f"and the supply has fallen to {in_digits(found / 1e5)} bar, where "
+            f"{in_digits(set_to / 1e5)} bar are set"
         )
 
 
