@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from examples import bifurcation, calibration, drill_design, rate_map, sensitivity
+from examples import bifurcation, calibration, chambers, drill_design, rate_map, sensitivity
 from examples.shared import arguments, write_example
 from percussion_model.interface.commands.common import end_script
 
-EXAMPLES = (bifurcation, rate_map, sensitivity, calibration, drill_design)
+EXAMPLES = (bifurcation, rate_map, sensitivity, calibration, drill_design, chambers)
 
 
 def main(out: Path, quick: bool = False, force: bool = False) -> None:

@@ -39,10 +39,13 @@ def tell(text: str, share: float | None = None) -> None:
         report(text, share)
 
 
-def study_points(points: Points, out: Path, quick: bool, most_blows: int) -> Study:
-    """Study points around the reference, and say how far it is."""
+def study_points(
+    points: Points, out: Path, quick: bool, most_blows: int, scene: Scene | None = None
+) -> Study:
+    """Study points around a scene, the reference if it is left out, and say how far it is."""
     return study(
-        Scene(), points, out / "points", most_blows=most_blows, processes=1 if quick else None,
+        scene or Scene(), points, out / "points", most_blows=most_blows,
+        processes=1 if quick else None,
         progress=lambda done, total: tell(f"{done} of {total} points", done / total),
     )  # fmt: skip
 

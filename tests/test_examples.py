@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from examples import bifurcation, drill_design, motions, rate_map
+from examples import bifurcation, chambers, drill_design, motions, rate_map
 from examples.all import EXAMPLES
 from examples.shared import command_line, figure_of, tell, write_example
-from percussion_model import Scene, SceneError, Simulation
+from percussion_model import Scene, SceneError, Simulation, settled
 from percussion_model.interface import progress
 from percussion_model.interface.commands.common import BAD_INPUT
 from percussion_model.simulation.files import to_json
@@ -176,6 +176,36 @@ def test_work_of_the_drive_is_that_of_the_ledger(changes):
     # The bit still moves a little, by microns, when the drive turns downward. Without the
     # penetration in the formula it would be a hundredth.
     assert works[1] - works[0] == pytest.approx(np.sum(work), rel=1e-3)
+
+
+# ---------------------------------------------------------------------------- chambers
+
+
+def test_loops_of_the_chambers_have_the_work_of_the_gas():
+    """With what friction takes; that work is made out step by step, not of the loops."""
+    found = sum(chambers.indicated_work(*loop) for loop in chambers.diagrams().values())
+    simulation = Simulation(chambers.SCENE)
+    simulation.advance(0.5)
+    blow, works = simulation.blows[-2], []
+    simulation = Simulation(chambers.SCENE)
+    for time in (blow["time"], blow["time"] + blow["period"]):
+        simulation.advance(float(time))
+        works.append(simulation.observe()["pneumatic_gas_work"])
+    rubbed = 2.0 * chambers.SCENE["pneumatic.friction"] * blow["stroke"]
+    assert found == pytest.approx(works[1] - works[0] + rubbed, rel=1e-2)
+
+
+def test_the_tuned_port_takes_the_air_that_was_given(found):
+    _, numbers = found("chambers")
+    best, fitted = (numbers["at_20_m3_min"][which] for which in ("best", "fitted"))
+    assert best["pressure"] <= chambers.MOST_PRESSURE
+    keys = (chambers.SUPPLY, chambers.EDGE)
+    scene = chambers.SCENE.replace(**dict(zip(keys, (best["pressure"], best["edge"]), strict=True)))
+    blow = settled(scene).counted[-1]
+    # four pressures of the quick form are far apart
+    assert blow["pneumatic_air"] / 1.2923 * 60.0 == pytest.approx(20.0, rel=3e-2)
+    assert blow["blow_energy"] == pytest.approx(best["blow_energy"], rel=3e-2)
+    assert best["blow_energy"] >= fitted["blow_energy"]
 
 
 # ------------------------------------------------------------------------ drill design

@@ -46,6 +46,7 @@ FOUND = {
     "drilling_cycles_per_blow": "-",
     "rotation_torque": "N m",
     "breaking_blow_volume": "m^3",
+    "pneumatic_air": "kg/s",
 }
 ROW = np.dtype(
     [
