@@ -136,6 +136,8 @@ def test_pressures_at_which_blows_die_out_have_no_law():
     found = drive_map(with_air("dth5", 24 * BAR), [0.2 * BAR, 24 * BAR], [0.3])
     assert np.isnan(found.rows["force"]).tolist() == [[True], [False]]
     assert np.isnan(found.own["rock_rate"][0])
+    assert found.worst.keys() == {"rows", "own"}
+    assert drive_map(with_air("dth5", 24 * BAR), [0.2 * BAR], [0.3]).worst == {}
 
 
 def test_the_command_writes_the_map_and_says_what_its_main_error_is(tmp_path):

@@ -60,11 +60,15 @@ class DriveMap:
 
     @property
     def worst(self) -> dict[str, float]:
-        """Greatest error of a blow's energy: between rows, in rock by them, and by its rebound."""
+        """Greatest error of a blow's energy: between rows, in rock by them, and by its rebound.
+
+        Of what nothing tells there is none.
+        """
         left_out = self.rows["left_out_blow_energy"]
         errors = {"left_out": left_out, "rows": self.rows["rock_blow_energy"]}
         errors["own"] = self.own["rock_blow_energy"]
-        return {key: float(np.nanmax(np.abs(one), initial=0.0)) for key, one in errors.items()}
+        known = {key: np.abs(one[np.isfinite(one)]) for key, one in errors.items()}
+        return {key: float(one.max()) for key, one in known.items() if len(one)}
 
 
 def drive_map(

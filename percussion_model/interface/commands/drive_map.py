@@ -126,12 +126,13 @@ def show(found: DriveMap, feed: float) -> None:
     from percussion_model.interface.tables import airy_table, print_notes, print_table
 
     table = airy_table(["\nbar", "\nrebound", *(one[0] for one in SHOWN)], (), pad_edge=False)
+    columns = (("", "rebound", 1.0, ".2f"), *SHOWN)
     for is_own, row in _in_order(found):
-        cells = (
+        rebound, *cells = (
             "-" if row[key] != row[key] else f"{factor * row[key]:{form}}"
-            for _, key, factor, form in SHOWN
+            for _, key, factor, form in columns
         )
-        table.add_row(f"{BAR * row['pressure']:.3g}", f"{row['rebound']:.2f}{'*' * is_own}", *cells)
+        table.add_row(f"{BAR * row['pressure']:.3g}", rebound + "*" * is_own, *cells)
     print_table(table, keys=2, groups=(4, 2, 3))
     print_notes(["", *about(found, feed)])
 
@@ -140,15 +141,21 @@ def about(found: DriveMap, feed: float) -> list[str]:
     """Say what the errors are of, and what is the greatest of them."""
     from percussion_model.analysis.drive_map import HELD
 
-    worst = {name: f"{100.0 * value:.2g} %" for name, value in found.worst.items()}
+    worst = found.worst
+    where = {
+        "left_out": "between rows",
+        "rows": "in this rock by the rows of other rebounds",
+        "own": "by its own",
+    }
     notes = [
         "Errors of the law: left out, where it is made from the rows beside it; in rock, run in "
         "place of the chambers in this scene. * is the rebound of its rock, with the law between "
-        "rows.",
-        f"Energy of a blow is off by up to {worst['left_out']} between rows, in this rock by up to "
-        f"{worst['rows']} by the rows of other rebounds, by up to {worst['own']} by its own.",
+        "rows."
     ]
-    if found.worst["rows"] > max(found.worst["left_out"], found.worst["own"]):
+    if worst:
+        told = (f"by up to {100.0 * worst[key]:.2g} % {where[key]}" for key in worst)
+        notes.append(f"Energy of a blow is off {', '.join(told)}.")
+    if worst.get("rows", 0.0) > max((worst[key] for key in worst if key != "rows"), default=1.0):
         notes[1] += " The main error is the rebound, which the rock sets, not pressure."
     loose = found.own["pressure"][found.own["force"] * HELD > feed]
     if len(loose):
