@@ -22,6 +22,7 @@ from percussion_model.analysis.drive_map import (
     settled_row,
 )
 from percussion_model.interface.cli import app
+from percussion_model.interface.commands import common
 from percussion_model.scene.hammers import CHAMBERS, with_air
 
 BAR = 1e5
@@ -86,7 +87,8 @@ def test_the_error_in_rock_is_that_of_the_rebound(found):
 
 def test_rows_are_left_out_between_others_alone(found):
     known = np.isfinite(found.rows[LEFT_OUT[1]])
-    assert known.tolist() == [[False, True, False], [True] * 3, [False, True, False]]
+    ends = [False, True, True, False]
+    assert known.tolist() == [ends, [True] * 4, ends]
     row, (below, above) = found.rows[1, 0], found.rows[[0, 2], 0]
     law = [0.5 * (below[name] + above[name]) for name in ("force", "reversal_distance")]
     mass = with_air("dth5", BAR).piston.mass
@@ -124,6 +126,15 @@ def test_the_law_that_stands_by_is_not_told_to_be_given_in_vain():
     assert any("effect in this scene: drive.force" in t for t in simulate(alone, 0.1).warnings)
     none = scene.replace(**{"effects.drive": "none", "drive.force": 5e3})
     assert "drive.force" in none.given_in_vain
+
+
+def test_a_hammer_on_another_rock_is_told_to_have_the_law_of_its_usual_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(common, "_hinted", set())
+    words = ["--hammer", "dth5", "--pressure", "24 bar"]
+    for rock, told in (([], False), (["--rock", "kuru-granite"], True)):
+        done = CliRunner().invoke(app, ["new", str(tmp_path / f"{told}.toml"), *words, *rock])
+        assert done.exit_code == 0
+        assert ("percussion drive-map" in done.stderr) == told
 
 
 @pytest.mark.parametrize("pressure", [-1e5, 3e7])

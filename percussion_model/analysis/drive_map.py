@@ -20,7 +20,7 @@ from percussion_model.scene.scene import Scene, SceneError
 __all__ = ["DriveMap", "drive_map"]
 
 # Rebounds, and pressures by that of the scene, where no others are asked for.
-REBOUNDS, PRESSURES = (0.1, 0.3, 0.5), (0.25, 0.5, 0.75, 1.0, 1.25)
+REBOUNDS, PRESSURES = (0.1, 0.3, 0.5, 0.7), (0.25, 0.5, 0.75, 1.0, 1.25)
 SUPPLY = "pneumatic.supply_pressure"
 # A bit so large that no blow moves it [m, m^2].
 AT_REST = [{"length": 10.0, "area": 10.0}]

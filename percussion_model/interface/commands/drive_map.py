@@ -45,7 +45,7 @@ def drive_map(
         typer.Option(
             "--rebounds",
             metavar="A,B,C",
-            help="Velocities after a blow by those before it; default 0.1,0.3,0.5.",
+            help="Velocities after a blow by those before it; default 0.1,0.3,0.5,0.7.",
         ),
     ] = None,
     settings: common.Settings = None,

@@ -277,6 +277,12 @@ def new(
     scene = common.with_bit(scene, bit)
     if changes := common.rock_changes(rock, scene):
         scene = scene.replace(**changes)
+        if pressure is not None:
+            common.hint(
+                "drive.force",
+                "drive.force and drive.reversal_distance, for effects.drive = pressure, are those "
+                "of the hammer's usual rock: `percussion drive-map` tells those of this one",
+            )
     scene.to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
 
