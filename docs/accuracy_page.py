@@ -269,26 +269,6 @@ def modes_table() -> str:
     return table(["scene", *labels, "rates, mm/s", "bar of the reference"], rows)
 
 
-def general() -> str:
-    """What general integrators of scipy need beside the built-in scheme on the same mesh."""
-    study = load_studies(("reference",))["reference"]
-    own = {point.label: point.second for point in study.ladder("fem")}
-    ratios = {
-        LADDERS[name].title: min(
-            point.second / own[point.label] for point in study.ladder(name) if point.label in own
-        )
-        for name in study.names
-        if LADDERS[name].family == "scipy"
-        and any(point.label in own for point in study.ladder(name))
-    }
-    title, least = min(ratios.items(), key=lambda pair: pair[1])
-    return (
-        f"On the finite elements' own equations the fastest method of scipy's `solve_ivp` "
-        f"({title.removeprefix('scipy ')}) needs at least {two(least)} times the time of the "
-        "built-in scheme."
-    )
-
-
 # runs that are not ladders
 
 
@@ -462,14 +442,8 @@ From {made}.
 """
 
 
-def wrapped(text: Callable[[], str]) -> Callable[[], str]:
-    """Sentences in lines as long as those that are written by hand."""
-    return lambda: textwrap.fill(text(), 108, break_long_words=False, break_on_hyphens=False)
-
-
 BLOCKS: dict[str, Callable[[], str]] = {
     "advantage": advantage,
-    "general": wrapped(general),
     "contests": contest_table,
     "modes": modes_table,
     "forces": force_table,

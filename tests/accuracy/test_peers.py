@@ -25,7 +25,6 @@ from percussion_model.verification.accuracy.problems import (
     relative_error,
 )
 from percussion_model.verification.accuracy.references import find_reference
-from percussion_model.verification.accuracy.semidiscrete import Drill
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 BARE = {
@@ -236,16 +235,6 @@ def test_a_peer_carries_an_effect_or_refuses_it(peer, key, value):
         assert np.all(change * wanted > 0.0)
     else:  # the barrier takes so little that a sixth of it depends on the mesh
         assert change == pytest.approx(wanted, rel=0.25, abs=1e-12)
-
-
-@pytest.mark.parametrize(("key", "value"), SWITCHES)
-def test_general_integrators_refuse_what_they_have_no_equation_for(key, value):
-    carried = [(f"effects.{one}", False) for one in ("gravity", "feed", "loss")]
-    if (key, value) in [*carried, ("effects.drive", "none")]:
-        Drill(with_switch(key, value))
-    else:
-        with pytest.raises(SceneError, match="general integrators: "):
-            Drill(with_switch(key, value))
 
 
 @pytest.mark.parametrize("peer", [*PEERS, ExplicitSolver])

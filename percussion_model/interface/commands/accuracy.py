@@ -29,7 +29,7 @@ def accuracy(
         typer.Option(
             "--methods",
             metavar="A,B",
-            help="As modal,fem,scipy; left out: all, of several scenes the quick ones.",
+            help="As modal,fem,exact-flow; left out: all, of several scenes the quick ones.",
         ),
     ] = None,
     make_references: Annotated[

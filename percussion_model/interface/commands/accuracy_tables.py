@@ -56,7 +56,6 @@ ABOUT_BOUNDS = (
 FAMILIES = {
     "peer": "best of explicit\nand exact",
     "fem": "best of implicit\nelements",
-    "scipy": "best of scipy",
 }
 
 

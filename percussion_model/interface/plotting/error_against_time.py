@@ -26,7 +26,7 @@ from percussion_model.verification.accuracy.study import Point, Study
 # Colour, dashes and marker of each ladder that is drawn; families share a colour. Ladders
 # that refine something else than steps or elements stand in the tables alone.
 _MODAL = "#222222"
-_WAVE, _FEM, _SCIPY, _RIGID, _PEER = "#0072B2", "#D55E00", "#009E73", "#595959", "#CC79A7"
+_WAVE, _FEM, _RIGID, _PEER = "#0072B2", "#D55E00", "#595959", "#CC79A7"
 LINES: dict[str, tuple[str, Any, str]] = {
     "modal": (_MODAL, "-", "*"),
     "wave": (_WAVE, "-", "o"),
@@ -36,8 +36,6 @@ LINES: dict[str, tuple[str, Any, str]] = {
     "fem-paper": ("#E69F00", (0, (4, 1.5)), "s"),
     "fem-gauss": (_FEM, (0, (1.2, 1.2)), "D"),
     "rigid": (_RIGID, "-", "X"),
-    "lsoda": (_SCIPY, "-", "^"),
-    "radau": (_SCIPY, (0, (4, 1.5)), "P"),
 }
 # Errors below this are drawn at it: they are zero within the bar of the reference.
 LEAST = 1e-7

@@ -27,7 +27,6 @@ from percussion_model.verification.accuracy.problems import (
     Problem,
     by_modes,
 )
-from percussion_model.verification.accuracy.semidiscrete import refuse_general
 
 __all__ = [
     "COMPARED",
@@ -90,7 +89,7 @@ class Ladder:
         What is refined, and what the order is measured against.
     note : str
         What else there is to know.
-    family : {"modal", "wave", "fem", "peer", "scipy", "rigid"}
+    family : {"modal", "wave", "fem", "peer", "rigid"}
         Methods of a family share a colour; the last has another model.
     """
 
@@ -148,12 +147,6 @@ LADDERS = {
             "fem",
         ),
         Ladder("rigid", "rigid", "", "an error of the model: there is nothing to refine", "rigid"),
-        Ladder(
-            "lsoda", "scipy LSODA", "element size", "relative tolerance 1e-4, K_C as fem", "scipy"
-        ),
-        Ladder(
-            "radau", "scipy Radau", "element size", "relative tolerance 1e-3, K_C as fem", "scipy"
-        ),
     )
 }
 
@@ -163,9 +156,6 @@ QUICK = (
     *("modal", "wave"),
     *("explicit", "exact-flow", "fem", "rigid"),
 )
-
-# Integrator, tolerance and meshes of the general methods.
-_GENERAL = {"lsoda": ("LSODA", 1e-4, (5, 10, 20, 30)), "radau": ("Radau", 1e-3, (5, 10, 20))}
 
 
 @dataclass(frozen=True)
@@ -180,13 +170,8 @@ class Rung:
         As in "24 steps".
     size : float
         What the order is measured against: step or element size by that of
-        the piston, CFL number, or tolerance; simulated time where motion is
-        aperiodic.
+        the piston, or CFL number; simulated time where motion is aperiodic.
     scene : Scene
-    integrator : str
-        Of scipy; empty for the solvers of the package.
-    relative : float
-        Its tolerance.
     duration : float or None
         Simulated time, where it is not that of the problem [s].
     peer : callable or None
@@ -197,16 +182,12 @@ class Rung:
     label: str
     size: float
     scene: Scene
-    integrator: str = ""
-    relative: float = 0.0
     duration: float | None = None
     peer: Callable[[Scene], Solver] | None = None
 
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of ladders from words.
-
-    "scipy" stands for all general integrators, "compared" for own solvers and their quick peers.
+    """Names of ladders from words; "compared" stands for own solvers and their quick peers.
 
     Raises
     ------
@@ -215,14 +196,12 @@ def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
     """
     if words is None:
         return tuple(LADDERS)
-    general = tuple(name for name in LADDERS if LADDERS[name].family == "scipy")
-    groups = {"scipy": general, COMPARED: QUICK}
     chosen: list[str] = []
     for word in words:
-        if word not in groups and word not in LADDERS:
-            known = ", ".join([*LADDERS, *groups])
+        if word != COMPARED and word not in LADDERS:
+            known = ", ".join([*LADDERS, COMPARED])
             raise SceneError(f"--methods: {word!r} is no method: {known}")
-        chosen += groups.get(word, (word,))
+        chosen += QUICK if word == COMPARED else (word,)
     return tuple(dict.fromkeys(chosen))
 
 
@@ -236,8 +215,6 @@ def refuse_asked(scene: Scene, names: Sequence[str]) -> None:
             scene.computed_by(LADDERS[name].family)
         elif name == "modal":
             by_modes(scene, PILOT_MODES)
-        elif name in _GENERAL:
-            refuse_general(scene)
 
 
 def fem_scene(
@@ -272,14 +249,13 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
         return list(_rising_durations(problem, full))
     if problem.scene.effects.string:
         return [*_waves(problem, full), *_elements_of_string(problem, full)]
-    rungs = [
+    return [
         *_modes(problem, full),
         *_waves(problem, full),
         *_compiled(problem, full),
         *_elements(problem, full),
+        Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")),
     ]
-    rungs.append(Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")))
-    return [*rungs, *_general(problem)]
 
 
 def total_length(scene: Scene) -> float:
@@ -386,19 +362,6 @@ def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
         for count in counts:
             peer = partial(make, elements=count)
             yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
-
-
-def _general(problem: Problem) -> Iterator[Rung]:
-    scene = problem.scene
-    for name, (method, tolerance, meshes) in _GENERAL.items():
-        try:
-            refuse_general(scene)
-        except SceneError:
-            meshes = meshes[:1]  # its note will tell why
-        for count in meshes:
-            if count * total_length(scene) <= MOST_ELEMENTS / 3:
-                chosen = fem_scene(scene, count, COURANT, stiffness_of(count))
-                yield Rung(name, f"{count} elements", 1.0 / count, chosen, method, tolerance)
 
 
 def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:

@@ -14,7 +14,6 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.simulate import Simulation
 from percussion_model.simulation.uncertain import in_digits
-from percussion_model.verification.accuracy.integrators import GeneralRun
 from percussion_model.verification.accuracy.ladders import (
     COMPARED,
     LADDERS,
@@ -39,7 +38,6 @@ from percussion_model.verification.accuracy.problems import (
     relative_error,
 )
 from percussion_model.verification.accuracy.references import Bar, Reference, find_reference
-from percussion_model.verification.accuracy.semidiscrete import OutOfTime
 from percussion_model.verification.accuracy.timing import interleaved, machine
 
 __all__ = ["WANTED", "Point", "Study", "study"]
@@ -47,11 +45,9 @@ __all__ = ["WANTED", "Point", "Study", "study"]
 # Errors whose cost is told.
 WANTED = (1e-2, 3e-3, 1e-3, 5e-4)
 # Families of ladders that the default solver is compared with: the best of them counts.
-PEERS = ("peer", "fem", "scipy")
+PEERS = ("peer", "fem")
 # Ladders of own solvers, and which stands in where the one that "auto" takes was not run.
 OWN = ("modal", "wave")
-# A general integrator gets so long for a blow [s].
-PATIENCE, PATIENCE_FULL = 25.0, 120.0
 # Errors below this multiple of the reference's bar are not resolved.
 RESOLVED = 2.0
 # Share of the time that the answers take, measured on the reference scene: each is one run,
@@ -388,8 +384,7 @@ def study(
     full : bool
         Whether to take the costly rungs as well.
     methods : sequence of str, optional
-        Names of `LADDERS`, or "scipy" for all general integrators, or "compared" for those of
-        the quick methods that carry the scene.
+        Names of `LADDERS`, or "compared" for those of the quick methods that carry the scene.
     progress : callable
         Called with what comes next, and the share of the work that is done; None while
         kernels may have to be compiled, which takes minutes or nothing.
@@ -427,8 +422,8 @@ def study(
                     Run(problem, rung.scene, rung.peer)
         else:
             progress(f"{title}, {rung.label}".rstrip(", "), ANSWERS * done / len(others))
-        points[k], run = _measured(rung, problem, reference, full)
-        if isinstance(run, Run) and not points[k].note:
+        points[k], run = _measured(rung, problem, reference)
+        if run is not None:
             runs.append((k, run))
     runs.sort(key=lambda one: one[0])
     times = interleaved(
@@ -457,12 +452,9 @@ def study(
 
 
 def in_turn(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
-    """Numbers of the rungs for which kernels may be compiled, to be taken first, and of others.
-
-    Those are the first ones of ladders; scipy's integrators are not compiled.
-    """
+    """Numbers of the first rungs of ladders, whose kernels may be compiled, and of the others."""
     first = {rung.ladder: k for k, rung in reversed(list(enumerate(rungs)))}
-    compiling = [k for k in sorted(first.values()) if not rungs[k].integrator]
+    compiling = sorted(first.values())
     return compiling, [k for k in range(len(rungs)) if k not in compiling]
 
 
@@ -476,38 +468,23 @@ def solvers_of(names: Iterable[str], scene: Scene) -> list[str]:
     return [name for name in known if name in needed]
 
 
-def _measured(
-    rung: Rung, problem: Problem, reference: Reference, full: bool
-) -> tuple[Point, Run | GeneralRun | None]:
-    """Take the answer of a rung; its time is taken later, but for general integrators.
+def _measured(rung: Rung, problem: Problem, reference: Reference) -> tuple[Point, Run | None]:
+    """Take the answer of a rung; its time is taken later.
 
     The blows of its run stand in `blow` until then.
     """
     empty = Point(rung.ladder, rung.label, rung.size, 0.0, math.nan, math.nan, 0, math.nan, {}, {})
     if rung.duration is not None:
         problem = replace(problem, duration=rung.duration)
-    patience = PATIENCE_FULL if full else PATIENCE
-    run: Run | GeneralRun
     try:
-        if rung.integrator:
-            run = GeneralRun(problem, rung.scene, rung.integrator, rung.relative, patience)
-        else:
-            run = Run(problem, rung.scene, rung.peer)
+        run = Run(problem, rung.scene, rung.peer)
         answer = run.answer()
-    except OutOfTime:
-        return replace(empty, note=f"took more than {patience:g} s for a blow"), None
     except (RuntimeError, ValueError, IndexError) as error:
         return replace(empty, note=f"failed: {error}"), None
+    errors = _errors(answer, problem, reference)
     point = replace(
-        empty,
-        setup=run.setup_time,
-        values=answer.values,
-        errors=_errors(answer, problem, reference),
-        blow=answer.blows,
+        empty, setup=run.setup_time, values=answer.values, errors=errors, blow=answer.blows
     )
-    if isinstance(run, GeneralRun):
-        cost = run.cost()
-        point = replace(point, blow=cost, second=cost / problem.period, repeats=1)
     return point, run
 
 
