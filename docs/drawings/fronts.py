@@ -14,18 +14,11 @@ WEAKEST = 0.12
 
 @dataclass(frozen=True)
 class Front:
-    """A front through one section: it starts and ends at a border, as (time [s], depth [m]).
-
-    Attributes
-    ----------
-    start, end : tuple of float
-    force : float
-        Force that it brings, by that of the first, positive in compression.
-    """
+    """A front through one section: it starts and ends at a border, as (time [s], depth [m])."""
 
     start: tuple[float, float]
     end: tuple[float, float]
-    force: float
+    force: float  # force that it brings, by that of the first, positive in compression
 
 
 def fronts(

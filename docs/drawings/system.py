@@ -38,19 +38,10 @@ class Block:
 
 @dataclass(frozen=True)
 class Route:
-    """Way of an arrow from component to component, and where its signals are written.
+    """Way of an arrow from component to component, and where its signals are written."""
 
-    Attributes
-    ----------
-    points : tuple of tuple
-        From the source to the sink.
-    text : tuple of float
-        Where the first signal stands.
-    align : str
-    """
-
-    points: tuple[Place, ...]
-    text: Place
+    points: tuple[Place, ...]  # from the source to the sink
+    text: Place  # where the first signal stands
     align: str
 
 

@@ -50,27 +50,14 @@ APPROXIMATE = (
 
 @dataclass(frozen=True)
 class Impact:
-    """The first impact of a scene by waves; times since it [s].
+    """The first impact of a scene by waves; times since it [s]."""
 
-    Attributes
-    ----------
-    time, edges : ndarray
-        Of the columns of `force` [s]; borders of its rows [m].
-    stress : ndarray, shape (cells, times)
-        Compression positive [Pa].
-    contacts : list of tuple
-    events : list of tuple
-        Time and kind.
-    start : float
-        Time of the impact in the run [s].
-    """
-
-    time: np.ndarray
-    edges: np.ndarray
-    stress: np.ndarray
+    time: np.ndarray  # of the columns of `stress` [s]
+    edges: np.ndarray  # borders of its rows [m]
+    stress: np.ndarray  # shape (cells, times), compression positive [Pa]
     contacts: list[tuple[float, float]]
-    events: list[tuple[float, int]]
-    start: float
+    events: list[tuple[float, int]]  # time and kind
+    start: float  # time of the impact in the run [s]
 
 
 def stepped(scene: Scene) -> Scene:

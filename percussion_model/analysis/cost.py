@@ -50,40 +50,18 @@ class Mark:
 
 @dataclass(frozen=True)
 class Forecast:
-    """Cost estimate of a run.
-
-    Attributes
-    ----------
-    solver : Solver
-    setup_time : float
-        Time to make the solver, compilation included [s].
-    wall_time : float
-        Predicted time of the whole run without set-up [s].
-    duration : float
-        Simulated time of that run [s].
-    per_second : float
-        Time for a simulated second, once blows follow each other [s].
-    per_blow : float or None
-        Time for a blow [s]; None where there were fewer than two.
-    counts : dict of float
-        Steps, leaps and events a blow, as far as the solver has them.
-    probed : float
-        Simulated time that it rests on [s].
-    runs : int
-        Runs that `setup_time` and `wall_time` are the sum of.
-    row_bytes : float
-        Rows of blows and events of the whole run, as the probe goes on [bytes].
-    """
+    """Cost estimate of a run."""
 
     solver: Solver
-    setup_time: float
-    wall_time: float
-    duration: float
-    per_second: float
-    per_blow: float | None
-    counts: dict[str, float]
-    probed: float
-    runs: int = 1
+    setup_time: float  # time to make the solver, compilation included [s]
+    wall_time: float  # predicted time of the whole run without set-up [s]
+    duration: float  # simulated time of that run [s]
+    per_second: float  # time for a simulated second, once blows follow each other [s]
+    per_blow: float | None  # time for a blow [s]; None where there were fewer than two
+    counts: dict[str, float]  # steps, leaps and events a blow, as far as the solver has them
+    probed: float  # simulated time that it rests on [s]
+    runs: int = 1  # runs that `setup_time` and `wall_time` are the sum of
+    # rows of blows and events of the whole run, as the probe goes on [bytes]
     row_bytes: float = 0.0
 
     @property

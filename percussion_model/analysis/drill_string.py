@@ -34,27 +34,16 @@ class JointReport:
     A wave that crosses a joint several times counts each time, and what the feed presses
     together counts as waves as well: as much in `came` as in `returned`.
 
-    Attributes
-    ----------
-    came : float
-        Energy of the waves that came down to it [J].
-    passed : float
-        Of those that left it downward [J]; part of it had come up from below.
-    returned : float
-        Of those that left it upward [J]; likewise.
-    efficiency : float
-        Share of the first wave that does not go back, (came - returned) / came, of one blow
-        at the mean impact velocity on a string at rest, without damper and feed; until a wave
-        has gone up and down the longer of the two bars after the front came to the joint.
-    least_force : float
-        Least force in it, mean of a time step; below zero: the greatest tension [N].
+    The efficiency is the share of the first wave that does not go back, (came - returned) / came,
+    of one blow at the mean impact velocity on a string at rest, without damper and feed; until a
+    wave has gone up and down the longer of the two bars after the front came to the joint.
     """
 
-    came: float
-    passed: float
-    returned: float
+    came: float  # energy of the waves that came down to it [J]
+    passed: float  # of those that left it downward [J]; part of it had come up from below
+    returned: float  # of those that left it upward [J]; likewise
     efficiency: float
-    least_force: float
+    least_force: float  # in it, mean of a time step; below zero: the greatest tension [N]
 
     @property
     def net(self) -> float:
@@ -66,25 +55,16 @@ class JointReport:
 class RockReport:
     """What reaches the rock, mean of a blow in the settled run.
 
-    Attributes
-    ----------
-    incident, reflected : float
-        Energy of the waves that came down to it and that it sent back [J].
-    work : float
-        Done on it [J].
-    penetration : float
-        Advance of the hole [m].
-    first_penetration : float
-        That of the first incident wave [m]: from when the front of the impact arrives until the
-        time in which a wave goes up to the struck end and comes back has passed, or the next
-        front arrives. So nothing that the rock sent up has been turned back by the struck end.
+    The first penetration is that of the first incident wave: from when the front of the impact
+    arrives until the time in which a wave goes up to the struck end and comes back has passed, or
+    the next front arrives. So nothing that the rock sent up has been turned back by the struck end.
     """
 
-    incident: float
-    reflected: float
-    work: float
-    penetration: float
-    first_penetration: float
+    incident: float  # energy of the waves that came down to it [J]
+    reflected: float  # of those that it sent back [J]
+    work: float  # done on it [J]
+    penetration: float  # advance of the hole [m]
+    first_penetration: float  # [m]
 
     @property
     def first_share(self) -> float:
@@ -94,21 +74,11 @@ class RockReport:
 
 @dataclass(frozen=True)
 class Extreme:
-    """Greatest or least value in a bar over the watched blow.
+    """Greatest or least value in a bar over the watched blow."""
 
-    Attributes
-    ----------
-    value : float
-        [Pa], compression positive
-    place : float
-        From the top of the bar, the middle of a cell [m].
-    time : float
-        Since the impact [s].
-    """
-
-    value: float
-    place: float
-    time: float
+    value: float  # [Pa], compression positive
+    place: float  # from the top of the bar, the middle of a cell [m]
+    time: float  # since the impact [s]
 
 
 @dataclass(frozen=True)
@@ -121,34 +91,16 @@ class BarStress:
 
 @dataclass(frozen=True, repr=False)
 class WatchedBlow:
-    """One blow of the settled run, step by step. Times count from its impact.
+    """One blow of the settled run, step by step. Times count from its impact."""
 
-    Attributes
-    ----------
-    time : float array, shape (n,)
-        [s]
-    start : float
-        Time of the impact in the run [s].
-    edges : dict of float array
-        By bar: edges of its cells, from its own top [m].
-    force : dict of float array, shape (n, cells)
-        By bar, compression positive [N].
-    area : dict of float array
-        By bar: of its cells [m2].
-    kinetic, elastic : dict of float array, shape (n,)
-        Energy of motion and of strain by bar [J].
-    contacts : list of (float, float)
-        From when to when the piston is on the struck bar [s].
-    """
-
-    time: np.ndarray
-    start: float
-    edges: dict[str, np.ndarray]
-    force: dict[str, np.ndarray]
-    area: dict[str, np.ndarray]
-    kinetic: dict[str, np.ndarray]
-    elastic: dict[str, np.ndarray]
-    contacts: list[tuple[float, float]]
+    time: np.ndarray  # shape (n,), [s]
+    start: float  # time of the impact in the run [s]
+    edges: dict[str, np.ndarray]  # by bar: edges of its cells, from its own top [m]
+    force: dict[str, np.ndarray]  # shape (n, cells), by bar, compression positive [N]
+    area: dict[str, np.ndarray]  # by bar: of its cells [m2]
+    kinetic: dict[str, np.ndarray]  # shape (n,), energy of motion by bar [J]
+    elastic: dict[str, np.ndarray]  # shape (n,), energy of strain by bar [J]
+    contacts: list[tuple[float, float]]  # from when to when the piston is on the struck bar [s]
 
     def __repr__(self) -> str:
         bars = ", ".join(self.force)
@@ -175,36 +127,17 @@ class WatchedBlow:
 
 @dataclass(frozen=True)
 class StringReport:
-    """Waves of a drill string in the settled run.
+    """Waves of a drill string in the settled run."""
 
-    Attributes
-    ----------
-    title : str
-        Of the scene.
-    transit_time : float
-        Of a wave from the struck end to the rock [s].
-    blows : int
-        Whole blows after settling, over which the means are taken.
-    period, blow_energy : float
-        Means [s, J].
-    joints : dict of JointReport
-        By the bars above and below, as "rod 1 / rod 2".
-    rock : RockReport
-    bars : dict of BarStress
-        Over the watched blow.
-    gauges : dict of (str, float) to float array
-        Stress over `watched.time`, by bar and distance from its top [Pa].
-    watched : WatchedBlow
-    """
-
-    title: str
-    transit_time: float
-    blows: int
-    period: float
-    blow_energy: float
-    joints: dict[str, JointReport]
+    title: str  # of the scene
+    transit_time: float  # of a wave from the struck end to the rock [s]
+    blows: int  # whole blows after settling, over which the means are taken
+    period: float  # mean [s]
+    blow_energy: float  # mean [J]
+    joints: dict[str, JointReport]  # by the bars above and below, as "rod 1 / rod 2"
     rock: RockReport
-    bars: dict[str, BarStress]
+    bars: dict[str, BarStress]  # over the watched blow
+    # stress over `watched.time`, by bar and distance from its top [Pa]
     gauges: Mapping[tuple[str, float], np.ndarray] = field(repr=False)
     watched: WatchedBlow
 

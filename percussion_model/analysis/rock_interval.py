@@ -26,22 +26,12 @@ DURATION, SETTLE = 2.0, 0.5
 
 
 class RateInterval(NamedTuple):
-    """What the intervals of rock and bit leave of a rate.
+    """What the intervals of rock and bit leave of a rate."""
 
-    Attributes
-    ----------
-    rock : str
-        Its name.
-    low, high : float
-        Rates between which nine tenths of the samples lie, by the rate itself.
-    samples : int
-        That have a rate.
-    """
-
-    rock: str
-    low: float
-    high: float
-    samples: int
+    rock: str  # its name
+    low: float  # nine tenths of the samples' rates lie above this, and
+    high: float  # below this, by the rate itself
+    samples: int  # that have a rate
 
 
 def interval_text(found: RateInterval, summary: Mapping[str, Any]) -> str:

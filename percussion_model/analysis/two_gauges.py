@@ -18,26 +18,14 @@ from percussion_model.simulation.simulate import Simulation
 
 
 class AtEnd(NamedTuple):
-    """What a bar does at its lower end.
+    """What a bar does at its lower end."""
 
-    Attributes
-    ----------
-    time : ndarray
-        [s]
-    force : ndarray
-        Compression positive [N].
-    velocity, displacement : ndarray
-        Down positive [m/s, m].
-    incident, reflected : float
-        Energy that came down to the end, and that went back up [J].
-    """
-
-    time: np.ndarray
-    force: np.ndarray
-    velocity: np.ndarray
-    displacement: np.ndarray
-    incident: float
-    reflected: float
+    time: np.ndarray  # [s]
+    force: np.ndarray  # compression positive [N]
+    velocity: np.ndarray  # down positive [m/s]
+    displacement: np.ndarray  # down positive [m]
+    incident: float  # energy that came down to the end [J]
+    reflected: float  # energy that went back up [J]
 
 
 def at_end(

@@ -100,24 +100,14 @@ class Series:
 
 @dataclass(frozen=True)
 class Place:
-    """Parameters and how well they explain the data.
+    """Parameters and how well they explain the data."""
 
-    Attributes
-    ----------
-    at : ndarray
-        Coordinates of the parameters: logarithms, but of `EXPONENTS`.
-    deviance : float
-        Twice the negative logarithm of the likelihood, noise at its best, but for a constant.
-    residuals : list of ndarray
-        Data less model of each series, then its unknowns with a minus.
-    noise : list of float
-        Standard deviation of each series.
-    """
-
-    at: np.ndarray
+    at: np.ndarray  # coordinates of the parameters: logarithms, but of `EXPONENTS`
+    # twice the negative logarithm of the likelihood, noise at its best, but for a constant
     deviance: float
+    # data less model of each series, then its unknowns with a minus
     residuals: list[np.ndarray] = field(repr=False)
-    noise: list[float]
+    noise: list[float]  # standard deviation of each series
 
 
 class Likelihood:

@@ -38,17 +38,10 @@ POINTS = 40
 
 @dataclass
 class Walk:
-    """Places that were looked at.
+    """Places that were looked at."""
 
-    Attributes
-    ----------
-    at : ndarray, shape (places, parameters)
-        Logarithms.
-    deviance : ndarray, shape (places,)
-    """
-
-    at: np.ndarray
-    deviance: np.ndarray
+    at: np.ndarray  # shape (places, parameters), logarithms
+    deviance: np.ndarray  # shape (places,)
 
     def joined(self, other: Walk) -> Walk:
         """Both together."""
@@ -79,23 +72,13 @@ class Walk:
 
 @dataclass(frozen=True)
 class Profile:
-    """What the walk says of one parameter, in the logarithm.
+    """What the walk says of one parameter, in the logarithm."""
 
-    Attributes
-    ----------
-    low, high : float
-        Ends of the interval; infinite where it is open within the range.
-    gap : (float, float) or None
-        Ends of a wide gap within: minima apart are as likely.
-    values, deviance : ndarray
-        Lowest deviance that was found at these values.
-    """
-
-    low: float
+    low: float  # ends of the interval; infinite where it is open within the range
     high: float
-    gap: tuple[float, float] | None
+    gap: tuple[float, float] | None  # ends of a wide gap within: minima apart are as likely
     values: np.ndarray = field(repr=False)
-    deviance: np.ndarray = field(repr=False)
+    deviance: np.ndarray = field(repr=False)  # the lowest that was found at these values
 
 
 class Explored(NamedTuple):

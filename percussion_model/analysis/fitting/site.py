@@ -63,23 +63,12 @@ class SiteEstimate:
 
 @dataclass(frozen=True)
 class SiteFit:
-    """What data tell of a scene.
-
-    Attributes
-    ----------
-    estimates : tuple of SiteEstimate
-    rows : tuple of (str, float, float)
-        Name, measured and of the model, at each setting.
-    rate : float
-        Of the scene with what was fitted [m/s].
-    rate_factor : float
-        Its standard error by that of the parameters, as a factor.
-    """
+    """What data tell of a scene."""
 
     estimates: tuple[SiteEstimate, ...]
-    rows: tuple[tuple[str, float, float], ...]
-    rate: float
-    rate_factor: float
+    rows: tuple[tuple[str, float, float], ...]  # name, measured and of the model, at each setting
+    rate: float  # of the scene with what was fitted [m/s]
+    rate_factor: float  # its standard error by that of the parameters, as a factor
 
     def rate_interval(self) -> tuple[float, float]:
         """Rates between which that of the scene lies with nine tenths, by the parameters [m/s]."""

@@ -31,36 +31,19 @@ THRESHOLD = "the motion is near a threshold"
 
 @dataclass(frozen=True)
 class Contest:
-    """The default solver and the best peer, at one error of one scene.
+    """The default solver and the best peer, at one error of one scene."""
 
-    Attributes
-    ----------
-    title : str
-        Of the scene.
-    wanted : float
-        Relative error that both have to meet for good.
-    own : Cost
-        Of the default solver.
-    peer : Cost or None
-        The cheapest of the peers, None where none meets the error.
-    outcome : str
-        `MET`, `PEER_MISSES`, `MISSED` or `UNDECIDED`.
-    ratio, low, high : float
-        Time of the peer by that of the solver, and its range. Where one of the two misses the
-        error, or meets it with its coarsest rung, a bound, from the dearest rung or from that.
-    why : str
-        Why it is undecided, or the peer faster; empty where neither is so.
-    """
-
-    title: str
-    wanted: float
-    own: Cost
-    peer: Cost | None
-    outcome: str
+    title: str  # of the scene
+    wanted: float  # relative error that both have to meet for good
+    own: Cost  # of the default solver
+    peer: Cost | None  # the cheapest of the peers, None where none meets the error
+    outcome: str  # `MET`, `PEER_MISSES`, `MISSED` or `UNDECIDED`
+    # time of the peer by that of the solver, and its range. Where one of the two misses the
+    # error, or meets it with its coarsest rung, a bound, from the dearest rung or from that
     ratio: float
     low: float
     high: float
-    why: str = ""
+    why: str = ""  # why it is undecided, or the peer faster; empty where neither is so
 
     @property
     def least(self) -> float:
@@ -150,26 +133,15 @@ UNKNOWN = Bounds(math.nan, math.nan)
 
 
 class Summary(NamedTuple):
-    """Ratios over scenes: those of the luckiest, the median and the worst.
-
-    Attributes
-    ----------
-    wanted : float
-    scenes, undecided : int
-        How many there are, and of how many there is no ratio, nor a bound.
-    luckiest, median, worst : Bounds
-        NaN where nothing is decided.
-    where : tuple of str
-        Titles of the luckiest and the worst scene.
-    """
+    """Ratios over scenes: those of the luckiest, the median and the worst."""
 
     wanted: float
     scenes: int
-    undecided: int
-    luckiest: Bounds
+    undecided: int  # scenes of which there is no ratio, nor a bound
+    luckiest: Bounds  # these three are NaN where nothing is decided
     median: Bounds
     worst: Bounds
-    where: tuple[str, str]
+    where: tuple[str, str]  # titles of the luckiest and the worst scene
 
 
 def summary(contests: Sequence[Contest]) -> Summary:

@@ -23,25 +23,13 @@ _ALONE = {"piston.model": "absent", "start.bit_velocity": 5.25}
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A motion whose answer is known.
-
-    Attributes
-    ----------
-    name : str
-    scene : Scene
-    time : float
-        At which the answer is known [s].
-    column : str
-        The quantity, of `SAMPLE_FIELDS`.
-    value : float
-        Its value then, SI units.
-    """
+    """A motion whose answer is known."""
 
     name: str
     scene: Scene
-    time: float
-    column: str
-    value: float
+    time: float  # at which the answer is known [s]
+    column: str  # the quantity, of `SAMPLE_FIELDS`
+    value: float  # its value then, SI units
 
 
 def closed_forms() -> list[ClosedForm]:

@@ -70,34 +70,18 @@ FLOW_STATE = np.dtype(
 
 
 class Flow(NamedTuple):
-    """Matrices of the flow, by mode of the rock and by level of the step; columns are rows.
+    """Matrices of the flow, by mode of the rock and by level of the step; columns are rows."""
 
-    Attributes
-    ----------
-    piston : ndarray, shape (1, LEVELS, 2 n_p + 2, 2 n_p)
-        Of a piston that is free.
-    bit : ndarray, shape (5, LEVELS, 2 n_b + 2, 2 n_b)
-    both : ndarray, shape (5, LEVELS, 2 n_p + 2 n_b + 2, 2 n_p + 2 n_b)
-        Of piston and bit that touch.
-    force : ndarray, shape (5, 2 n_p + 2 n_b + 2)
-        Contact force by the state [N].
-    kick : ndarray, shape (2 n_p + 2 n_b + 2,)
-        What an impulse of the contact does to the state.
-    share : ndarray, shape (n_p + n_b,)
-        Mass that moves with a node [kg].
-    mass : ndarray, shape (2, n_b)
-        Of the bit: diagonal of its matrix, and what is next to it [kg].
-    spring : ndarray, shape (2, n_b)
-        Stiffness below a node [N/m], and the mass above the middle between it and the next.
-    """
-
-    piston: np.ndarray
-    bit: np.ndarray
+    piston: np.ndarray  # shape (1, LEVELS, 2 n_p + 2, 2 n_p), of a piston that is free
+    bit: np.ndarray  # shape (5, LEVELS, 2 n_b + 2, 2 n_b)
+    # shape (5, LEVELS, 2 n_p + 2 n_b + 2, 2 n_p + 2 n_b), of piston and bit that touch
     both: np.ndarray
-    force: np.ndarray
-    kick: np.ndarray
-    share: np.ndarray
+    force: np.ndarray  # shape (5, 2 n_p + 2 n_b + 2), contact force by the state [N]
+    kick: np.ndarray  # shape (2 n_p + 2 n_b + 2,), what an impulse of the contact does to the state
+    share: np.ndarray  # shape (n_p + n_b,), mass that moves with a node [kg]
+    # shape (2, n_b), of the bit: diagonal of its matrix, and what is next to it [kg]
     mass: np.ndarray
+    # shape (2, n_b): stiffness below a node [N/m]; mass above the middle between it and the next
     spring: np.ndarray
 
 

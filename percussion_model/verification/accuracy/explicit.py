@@ -76,15 +76,9 @@ def stable_step(transit_time: float, loss_time: float) -> float:
 
 
 class Elements(NamedTuple):
-    """Elements of one bar, top to bottom.
+    """Elements of one bar, top to bottom."""
 
-    Attributes
-    ----------
-    mass : ndarray, shape (n,)
-        Of each [kg].
-    """
-
-    mass: np.ndarray
+    mass: np.ndarray  # shape (n,), of each [kg]
 
     @property
     def n(self) -> int:

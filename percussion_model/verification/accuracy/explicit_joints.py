@@ -41,23 +41,13 @@ FIT = np.dtype(
 
 
 class Chain(NamedTuple):
-    """What kernels need of a chain of bars; None in its place leaves all of it out.
+    """What kernels need of a chain of bars; None in its place leaves all of it out."""
 
-    Attributes
-    ----------
-    fits : ndarray of FIT, shape (bars - 1,)
-    mass : ndarray, shape (bars,)
-        Of each bar [kg].
-    bars, joints : ndarray, shape (BAR_ROWS, bars) and (JOINT_ROWS, bars - 1)
-    before : ndarray, shape (nodes,)
-        Velocities of a step ago [m/s].
-    """
-
-    fits: np.ndarray
-    mass: np.ndarray
-    bars: np.ndarray
-    joints: np.ndarray
-    before: np.ndarray
+    fits: np.ndarray  # of FIT, shape (bars - 1,)
+    mass: np.ndarray  # shape (bars,), of each bar [kg]
+    bars: np.ndarray  # shape (BAR_ROWS, bars)
+    joints: np.ndarray  # shape (JOINT_ROWS, bars - 1)
+    before: np.ndarray  # shape (nodes,), velocities of a step ago [m/s]
 
 
 @inlined

@@ -78,25 +78,13 @@ DURATIONS = (4.0, 16.0, 64.0, 256.0)  # of aperiodic runs, in sixteenths of the 
 
 @dataclass(frozen=True)
 class Ladder:
-    """A method and the setting that is refined.
-
-    Attributes
-    ----------
-    name : str
-    title : str
-        For tables and legends.
-    knob : str
-        What is refined, and what the order is measured against.
-    note : str
-        What else there is to know.
-    family : {"modal", "wave", "fem", "peer", "rigid"}
-        Methods of a family share a colour; the last has another model.
-    """
+    """A method and the setting that is refined."""
 
     name: str
-    title: str
-    knob: str
-    note: str
+    title: str  # for tables and legends
+    knob: str  # what is refined, and what the order is measured against
+    note: str  # what else there is to know
+    # "modal", "wave", "fem", "peer" or "rigid", which has another model; a family shares a colour
     family: str = "peer"
 
 
@@ -160,29 +148,16 @@ QUICK = (
 
 @dataclass(frozen=True)
 class Rung:
-    """A method at one effort.
+    """A method at one effort."""
 
-    Attributes
-    ----------
-    ladder : str
-        Name of the ladder.
-    label : str
-        As in "24 steps".
-    size : float
-        What the order is measured against: step or element size by that of
-        the piston, or CFL number; simulated time where motion is aperiodic.
-    scene : Scene
-    duration : float or None
-        Simulated time, where it is not that of the problem [s].
-    peer : callable or None
-        Makes a peer's solver of the scene; None for the solver that the scene names.
-    """
-
-    ladder: str
-    label: str
+    ladder: str  # name of the ladder
+    label: str  # as in "24 steps"
+    # what the order is measured against: step or element size by that of the piston, or CFL
+    # number; simulated time where motion is aperiodic
     size: float
     scene: Scene
-    duration: float | None = None
+    duration: float | None = None  # simulated time, where it is not that of the problem [s]
+    # makes a peer's solver of the scene; None for the solver that the scene names
     peer: Callable[[Scene], Solver] | None = None
 
 

@@ -26,23 +26,12 @@ LEAST_SHOWN = 0.01
 
 @dataclass(frozen=True)
 class Order:
-    """A power law through errors.
+    """A power law through errors."""
 
-    Attributes
-    ----------
-    value : float
-        Exponent.
-    error : float
-        Its standard error; of few points no less than half the spread of the orders between
-        neighbours.
-    scale : float
-        Error at size one.
-    points : int
-    """
-
-    value: float
+    value: float  # exponent
+    # standard error; of few points at least half the spread of the orders between neighbours
     error: float
-    scale: float
+    scale: float  # error at size one
     points: int
 
     def __str__(self) -> str:
@@ -53,27 +42,17 @@ class Order:
 class Cost:
     """What a wanted error costs, with its range.
 
-    Attributes
-    ----------
-    ladder : str
-    value : float
-        Least time, NaN where no rung meets the error [s].
-    low, high : float
-        Range: errors are as sure as the reference's bar, times as the usual spread of the
-        ladder's repeats. `low` is NaN where the error is surely missed, `high` where it is
-        not surely met.
-    dearest : float
-        Time of the dearest rung that was tried [s].
-    is_bound : bool
-        Whether every rung meets the error: a coarser one might cost less, so that value and
-        range are those of an upper bound.
+    In the range errors are as sure as the reference's bar, times as the usual spread of the
+    ladder's repeats.
     """
 
     ladder: str
-    value: float
-    low: float
-    high: float
-    dearest: float
+    value: float  # least time, NaN where no rung meets the error [s]
+    low: float  # NaN where the error is surely missed [s]
+    high: float  # NaN where it is not surely met [s]
+    dearest: float  # time of the dearest rung that was tried [s]
+    # whether every rung meets the error: a coarser one might cost less, so that value and range
+    # are those of an upper bound
     is_bound: bool = False
 
     @property

@@ -80,25 +80,16 @@ QUANTITIES = {
 class Answer:
     """Answer of a method.
 
-    Attributes
-    ----------
-    values : dict of float
-        By the names of `QUANTITIES`, SI units.
-    errors : dict of float
-        Standard errors, where the motion is aperiodic.
-    histories : dict of ndarray
-        By the names of `HISTORIES`, from the start of a blow, positive in compression: force
-        on the rock [N] and elastic stress in the middle of the bit [Pa] at the problem's
-        offsets, force between piston and bit [N] as means between its `contact_edges`. What
-        a method does not tell is left out.
-    blows : float
-        Blows that the timed run went through.
+    Histories are from the start of a blow, positive in compression: force on the rock [N] and
+    elastic stress in the middle of the bit [Pa] at the problem's offsets, force between piston and
+    bit [N] as means between its `contact_edges`. What a method does not tell is left out.
     """
 
-    values: dict[str, float]
+    values: dict[str, float]  # by the names of `QUANTITIES`, SI units
+    # standard errors, where the motion is aperiodic
     errors: dict[str, float] = field(default_factory=dict)
-    histories: dict[str, np.ndarray] = field(default_factory=dict)
-    blows: float = 1.0
+    histories: dict[str, np.ndarray] = field(default_factory=dict)  # by the names of `HISTORIES`
+    blows: float = 1.0  # blows that the timed run went through
 
 
 def relative_error(
@@ -121,23 +112,12 @@ def relative_error(
 
 @dataclass(frozen=True)
 class Problem:
-    """What every method computes of a scene.
+    """What every method computes of a scene."""
 
-    Attributes
-    ----------
-    scene : Scene
-        To be computed by any solver; starts near its periodic motion.
-    kind : {"periodic", "aperiodic", "drop"}
-    duration : float
-        Simulated time of a run [s].
-    period : float
-        Of a blow, as the pilot run found it [s]; of a drop its duration.
-    """
-
-    scene: Scene
-    kind: str
-    duration: float
-    period: float
+    scene: Scene  # to be computed by any solver; starts near its periodic motion
+    kind: str  # `PERIODIC`, `APERIODIC` or `DROP`
+    duration: float  # simulated time of a run [s]
+    period: float  # of a blow, as the pilot run found it [s]; of a drop its duration
 
     @property
     def offsets(self) -> np.ndarray:

@@ -87,25 +87,15 @@ CLOSE = 2e-3
 
 @dataclass(frozen=True)
 class Bar:
-    """A number with its bar.
+    """A number with its bar."""
 
-    Attributes
-    ----------
-    value, error : float
-        Reference and its bar, SI units; of a history 1 and the bar of its L1 norm.
-    limits : dict of (float, float)
-        Limit of each solver and its own bar; of a history by L1 distance to the waves.
-    agreed : bool
-        Whether it is a reference.
-    threshold : bool
-        Whether modes that are refined find another motion: then the value is the middle of all
-        that they and the surest limit found, and the bar covers it.
-    """
-
-    value: float
-    error: float
+    value: float  # reference, SI units; of a history 1
+    error: float  # its bar; of a history that of its L1 norm
+    # limit of each solver and its own bar; of a history by L1 distance to the waves
     limits: dict[str, tuple[float, float]]
-    agreed: bool
+    agreed: bool  # whether it is a reference
+    # whether modes that are refined find another motion: then the value is the middle of all that
+    # they and the surest limit found, and the bar covers it
     threshold: bool = False
 
     @classmethod
@@ -306,21 +296,12 @@ def make_reference(
 
 
 class Level(NamedTuple):
-    """A solver at one resolution.
-
-    Attributes
-    ----------
-    name : str
-    scene : Scene
-    size : float
-        Of a step or element, by that of the first bar.
-    peer : callable or None
-        Makes explicit elements; None for the solver that the scene names.
-    """
+    """A solver at one resolution."""
 
     name: str
     scene: Scene
-    size: float
+    size: float  # of a step or element, by that of the first bar
+    # makes explicit elements; None for the solver that the scene names
     peer: Callable[[Scene], Solver] | None = None
 
 

@@ -22,20 +22,11 @@ REPEATS = 5
 
 @dataclass(frozen=True)
 class Timing:
-    """Repeated times.
+    """Repeated times."""
 
-    Attributes
-    ----------
-    median : float
-        [s]
-    repeats : int
-    spread : float
-        Half their range by the median; NaN with one.
-    """
-
-    median: float
+    median: float  # [s]
     repeats: int
-    spread: float
+    spread: float  # half their range by the median; NaN with one
 
     @classmethod
     def of(cls, times: Sequence[float]) -> Timing:

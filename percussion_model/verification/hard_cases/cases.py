@@ -26,21 +26,11 @@ CEILING = 20_000.0
 
 @dataclass(frozen=True)
 class Change:
-    """Inputs that change at a time, or again and again.
+    """Inputs that change at a time, or again and again."""
 
-    Attributes
-    ----------
-    inputs : dict of tuple
-        Values of each input, taken in turn.
-    at : float
-        When for the first time [s].
-    every : float or None
-        And again after so long [s].
-    """
-
-    inputs: dict[str, tuple[float, ...]]
-    at: float
-    every: float | None
+    inputs: dict[str, tuple[float, ...]]  # values of each input, taken in turn
+    at: float  # when for the first time [s]
+    every: float | None  # and again after so long [s]
 
     def times(self, end: float) -> list[float]:
         """When the inputs change before `end` [s]."""

@@ -25,27 +25,15 @@ SIGMAS, LEAST_CHANCE = 3.0, 1e-3
 
 @dataclass(frozen=True)
 class Refinement:
-    """Change on a grid of twice as many cells; NaN where there is nothing to compare.
+    """Change on a grid of twice as many cells; NaN where there is nothing to compare."""
 
-    Attributes
-    ----------
-    rate_change : float
-        Of the rate of penetration, divided by the finer one.
-    rate_sigmas : float
-        The same, in standard errors of both.
-    path_change : float
-        Greatest change of the bit's path through the first contact, divided by its length.
-    periods_chance : float
-        Chance of two samples of periods that differ as much (Kolmogorov-Smirnov).
-    converged : bool or None
-        Whether the rate (periodic), or rate and periods (aperiodic), stay as they
-        are; None where there is no rate.
-    """
-
-    rate_change: float = math.nan
-    rate_sigmas: float = math.nan
+    rate_change: float = math.nan  # of the rate of penetration, divided by the finer one
+    rate_sigmas: float = math.nan  # the same, in standard errors of both
+    # greatest change of the bit's path through the first contact, divided by its length
     path_change: float = math.nan
+    # chance of two samples of periods that differ as much (Kolmogorov-Smirnov)
     periods_chance: float = math.nan
+    # whether rate (periodic), or rate and periods (aperiodic), stay; None where there is no rate
     converged: bool | None = None
 
     def to_dict(self) -> dict[str, Any]:

@@ -25,47 +25,25 @@ LEAST_SAMPLES = 3
 
 @dataclass(frozen=True)
 class Reading:
-    """How a blow is read.
+    """How a blow is read."""
 
-    Attributes
-    ----------
-    gauge : float or None
-        From the top of the bit [m]; None: its middle.
-    end : bool
-        Whether speeds are those of the bit's lower end in place of its mean.
-    slope_to : float
-        Share of the greatest displacement to which the slope of indentation is taken.
-    """
-
-    gauge: float | None = None
-    end: bool = False
+    gauge: float | None = None  # from the top of the bit [m]; None: its middle
+    end: bool = False  # whether speeds are those of the bit's lower end in place of its mean
+    # share of the greatest displacement to which the slope of indentation is taken
     slope_to: float = SLOPE_TO
 
 
 @dataclass(frozen=True, repr=False)
 class Blow:
-    """One blow, sampled; times count from the start of the run.
-
-    Attributes
-    ----------
-    scene : Scene
-    time : float array, shape (n,)
-        [s]
-    mean, end : float array, shape (n,)
-        Displacement of the bit's mean and of its lower end, down positive [m].
-    force : float array, shape (n,)
-        On the rock [N].
-    in_flight, struck : bool array, shape (n,)
-        Where the bit is off the rock, and where the piston is on it.
-    """
+    """One blow, sampled; times count from the start of the run."""
 
     scene: Scene
-    time: np.ndarray
-    mean: np.ndarray
-    end: np.ndarray
-    force: np.ndarray
-    in_flight: np.ndarray
-    struck: np.ndarray
+    time: np.ndarray  # shape (n,), [s]
+    mean: np.ndarray  # shape (n,), displacement of the bit's mean, down positive [m]
+    end: np.ndarray  # shape (n,), that of its lower end [m]
+    force: np.ndarray  # shape (n,), on the rock [N]
+    in_flight: np.ndarray  # shape (n,), where the bit is off the rock
+    struck: np.ndarray  # shape (n,), where the piston is on the bit
 
     def __repr__(self) -> str:
         return f"Blow({len(self.time)} samples to {self.time[-1]:.3g} s)"

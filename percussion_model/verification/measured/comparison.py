@@ -67,91 +67,49 @@ OTHER_ROCKS = (0.5, 2.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One number: measured, computed, and whether its criterion is met. SI units.
-
-    Attributes
-    ----------
-    experiment, rock, law, fit : str
-    role : str
-        `fitted` or `predicted`.
-    id, quantity : str
-        Of the measurement.
-    speed : float or None
-        Of the piston [m/s].
-    measured, error : float
-    source : str
-        Measured or computed by others, and whether second hand.
-    computed : float
-        NaN where the blow has no such thing.
-    numerical_error : float
-        Of the computed number, by the time step.
-    fit_error : float
-        Of the computed number, by the errors of the numbers that were fitted.
-    deviation : float
-        Share of the measured value, or the difference where the quantity is not relative.
-    within : float or None
-        Criterion, as the deviation.
-    verdict : str
-        `met`, `missed`, `undecided`, `no criterion`; `fitted` for what was fitted and reached.
-    reason : str
-        Why there is no criterion.
-    decided_by : str
-        `rock` or `masses`, of a prediction with a criterion: the rock decides what half or twice
-        its stiffness, or of gamma - 1, moves by more than the criterion.
-    """
+    """One number: measured, computed, and whether its criterion is met. SI units."""
 
     experiment: str
     rock: str
     law: str
     fit: str
-    role: str
-    id: str
+    role: str  # `fitted` or `predicted`
+    id: str  # of the measurement
     quantity: str
-    speed: float | None
+    speed: float | None  # of the piston [m/s]
     measured: float
     error: float
-    source: str
-    computed: float
-    numerical_error: float
-    fit_error: float
+    source: str  # measured or computed by others, and whether second hand
+    computed: float  # NaN where the blow has no such thing
+    numerical_error: float  # of the computed number, by the time step
+    fit_error: float  # of the computed number, by the errors of the numbers that were fitted
+    # share of the measured value, or the difference where the quantity is not relative
     deviation: float
-    within: float | None
+    within: float | None  # criterion, as the deviation
+    # `met`, `missed`, `undecided`, `no criterion`; `fitted` for what was fitted and reached
     verdict: str
-    reason: str
+    reason: str  # why there is no criterion
+    # `rock` or `masses`, of a prediction with a criterion: the rock decides what half or twice
+    # its stiffness, or of gamma - 1, moves by more than the criterion
     decided_by: str = ""
 
 
 @dataclass(frozen=True)
 class FoundFit:
-    """Parameters that a fit found, and those that it kept.
-
-    Attributes
-    ----------
-    experiment, law, name : str
-    start : str
-        Fit whose parameters hold for all others; empty: those of the scene.
-    fitted : tuple of str
-    values : dict of float
-        Of the parameters that the fit moved, set or took over, SI units.
-    errors : dict of float
-        Standard errors of the fitted ones, by the errors of the measurements.
-    prediction_errors : dict of float
-        The same of each predicted number, by the id of its measurement.
-    to : tuple of str
-    scene : Scene
-        With these parameters.
-    """
+    """Parameters that a fit found, and those that it kept."""
 
     experiment: str
     law: str
     name: str
-    start: str
+    start: str  # fit whose parameters hold for all others; empty: those of the scene
     fitted: tuple[str, ...]
-    values: dict[str, float]
+    values: dict[str, float]  # of the parameters that the fit moved, set or took over, SI units
+    # standard errors of the fitted ones, by the errors of the measurements
     errors: dict[str, float]
+    # the same of each predicted number, by the id of its measurement
     prediction_errors: dict[str, float]
     to: tuple[str, ...]
-    scene: Scene = field(repr=False)
+    scene: Scene = field(repr=False)  # with these parameters
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, without the scene."""
@@ -176,15 +134,7 @@ class VariantRow:
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """All experiments compared.
-
-    Attributes
-    ----------
-    experiments : list of Experiment
-    rows : list of Row
-    fits : list of FoundFit
-    variants : list of VariantRow
-    """
+    """All experiments compared."""
 
     experiments: list[Experiment]
     rows: list[Row]

@@ -53,40 +53,19 @@ class ExperimentError(ValueError):
 
 @dataclass(frozen=True)
 class Measurement:
-    """One number of an experiment, SI units.
+    """One number of an experiment, SI units."""
 
-    Attributes
-    ----------
-    id : str
-        By which fits name it.
-    quantity : str
-        One of `QUANTITIES`.
-    value, error : float
-        Error: of the measurement and of reading it, together.
-    kind : str
-        One of `KINDS`: measured; computed by others; or points of both, not told apart.
-    read : str
-        Where and how the number was read.
-    speed : float or None
-        Of the piston [m/s]; None where the scene alone tells.
-    second_hand : bool
-        Whether it was read in a quotation, not in the publication itself.
-    within : float or None
-        Criterion: share of the value, or a difference where the quantity is not relative.
-    no_criterion : str
-        Why there is none.
-    """
-
-    id: str
-    quantity: str
+    id: str  # by which fits name it
+    quantity: str  # one of `QUANTITIES`
     value: float
-    error: float
-    kind: str
-    read: str
-    speed: float | None = None
-    second_hand: bool = False
+    error: float  # of the measurement and of reading it, together
+    kind: str  # one of `KINDS`: measured; computed by others; or points of both, not told apart
+    read: str  # where and how the number was read
+    speed: float | None = None  # of the piston [m/s]; None where the scene alone tells
+    second_hand: bool = False  # whether it was read in a quotation, not in the publication itself
+    # criterion: share of the value, or a difference where the quantity is not relative
     within: float | None = None
-    no_criterion: str = ""
+    no_criterion: str = ""  # why there is none
 
     @property
     def source_text(self) -> str:
@@ -96,87 +75,44 @@ class Measurement:
 
 @dataclass(frozen=True)
 class FitPlan:
-    """What is fitted to what, and what is predicted with it.
-
-    Attributes
-    ----------
-    name : str
-    law : str
-        Rock law, one of `LAWS`.
-    parameters : tuple of str
-        Keys that are fitted, as many as there are measurements in `to`.
-    to, predicts : tuple of str
-        Measurements by their ids.
-    start : str
-        Fit whose parameters hold for all others; empty: those of the scene.
-    fixed : dict of float
-        Parameters that were chosen before the fit, SI units.
-    """
+    """What is fitted to what, and what is predicted with it."""
 
     name: str
-    law: str
-    parameters: tuple[str, ...]
-    to: tuple[str, ...]
+    law: str  # rock law, one of `LAWS`
+    parameters: tuple[str, ...]  # keys that are fitted, as many as there are measurements in `to`
+    to: tuple[str, ...]  # measurements by their ids, as in `predicts`
     predicts: tuple[str, ...] = ()
-    start: str = ""
+    start: str = ""  # fit whose parameters hold for all others; empty: those of the scene
+    # parameters that were chosen before the fit, SI units
     fixed: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """Another rig, or another place where it is read, to see what the choice is worth.
-
-    Attributes
-    ----------
-    name, why : str
-    changes : dict
-        Of the scene, by dotted keys.
-    gauge : float or None
-        Place of the gauge in place of the experiment's [m].
-    end : bool
-        Whether speeds are those of the bit's lower end in place of its mean.
-    slope_to : float
-        Share of the greatest displacement to which the slope of indentation is taken.
-    after_run : bool
-        Whether it was thought of after the experiment had been computed.
-    """
+    """Another rig, or another place where it is read, to see what the choice is worth."""
 
     name: str
     why: str
-    changes: dict[str, Any] = field(default_factory=dict)
-    gauge: float | None = None
-    end: bool = False
+    changes: dict[str, Any] = field(default_factory=dict)  # of the scene, by dotted keys
+    gauge: float | None = None  # place of the gauge in place of the experiment's [m]
+    end: bool = False  # whether speeds are those of the bit's lower end in place of its mean
+    # share of the greatest displacement to which the slope of indentation is taken
     slope_to: float = SLOPE_TO
-    after_run: bool = False
+    after_run: bool = False  # whether it was thought of after the experiment had been computed
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """One experiment.
-
-    Attributes
-    ----------
-    name, title, rock, about : str
-    source : dict of str
-        `published`, `doi` and `read_in`.
-    scene : Scene
-        The rig: one blow.
-    gauge : float or None
-        From the top of the bit [m]; None: its middle.
-    measured : dict of Measurement
-        By id.
-    fits : tuple of FitPlan
-    variants : tuple of Variant
-    """
+    """One experiment."""
 
     name: str
     title: str
     rock: str
     about: str
-    source: dict[str, str]
-    scene: Scene
-    gauge: float | None
-    measured: dict[str, Measurement]
+    source: dict[str, str]  # `published`, `doi` and `read_in`
+    scene: Scene  # the rig: one blow
+    gauge: float | None  # from the top of the bit [m]; None: its middle
+    measured: dict[str, Measurement]  # by id
     fits: tuple[FitPlan, ...]
     variants: tuple[Variant, ...] = ()
 

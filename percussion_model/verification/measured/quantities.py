@@ -6,30 +6,14 @@ from typing import NamedTuple
 
 
 class Quantity(NamedTuple):
-    """What is measured, and how tables show it.
+    """What is measured, and how tables show it."""
 
-    Attributes
-    ----------
-    words : str
-        For tables.
-    si : str
-        Unit of all values.
-    unit : str
-        That tables show.
-    scale : float
-        SI value of that unit.
-    definition : str
-        How it is read off a computed blow.
-    relative : bool
-        Whether a criterion is a share of the measured value; else a difference.
-    """
-
-    words: str
-    si: str
-    unit: str
-    scale: float
-    definition: str
-    relative: bool = True
+    words: str  # for tables
+    si: str  # unit of all values
+    unit: str  # that tables show
+    scale: float  # SI value of that unit
+    definition: str  # how it is read off a computed blow
+    relative: bool = True  # whether a criterion is a share of the measured value; else a difference
 
 
 QUANTITIES = {

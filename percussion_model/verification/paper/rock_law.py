@@ -29,25 +29,13 @@ LATE = 0.5
 
 @dataclass(frozen=True)
 class Jump:
-    """Start of a drilling cycle, SI units.
+    """Start of a drilling cycle, SI units."""
 
-    Attributes
-    ----------
-    after : float
-        Penetration while drilling just after; above zero where the bit turns under load.
-    jump : float
-        Of the datum x_R.
-    expected : float
-        The same by eqs 19, 21 and 22 of the paper; NaN where the peak of the cycle
-        before was not seen.
-    drift : float
-        Change of x_R since the event before.
-    """
-
-    after: float
-    jump: float
+    after: float  # penetration while drilling just after; above zero where the bit turns under load
+    jump: float  # of the datum x_R
+    # by eqs 19, 21 and 22 of the paper; NaN where the peak of the cycle before was not seen
     expected: float
-    drift: float
+    drift: float  # change of x_R since the event before
 
 
 def datum_jumps(scene: Scene, restart: Snapshot, end: float) -> list[Jump]:

@@ -88,26 +88,13 @@ def _run(scene: Scene, energy: float, damping: float) -> Drop:
 
 @dataclass(frozen=True)
 class Sweep:
-    """One parameter varied, all else as in the reference.
+    """One parameter varied, all else as in the reference."""
 
-    Attributes
-    ----------
-    name : str
-        Letter of the paper's plot.
-    key : str
-        Parameter along the axis.
-    values : ndarray
-        SI units.
-    solver : str
-    changes : dict
-        Of other parameters, by dotted key.
-    """
-
-    name: str
-    key: str
-    values: np.ndarray
+    name: str  # letter of the paper's plot
+    key: str  # parameter along the axis
+    values: np.ndarray  # SI units
     solver: str = "wave"
-    changes: Mapping[str, float] = field(default_factory=dict)
+    changes: Mapping[str, float] = field(default_factory=dict)  # of other parameters, by dotted key
 
 
 # The text of the paper makes K_C a tenth of the largest entry of the stiffness matrix, 2EA/L_e,

@@ -71,24 +71,14 @@ ERRORS = (
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement of the paper, and whether it holds.
+    """One statement of the paper, and whether it holds."""
 
-    Attributes
-    ----------
-    place, says, found : str
-        Where the paper says what, and what was found here.
-    agrees : bool
-    why : str
-        Why it differs.
-    agrees_if : str
-        What is asked of a number to agree; empty where the words of the paper tell it.
-    """
-
-    place: str
-    says: str
-    found: str
+    place: str  # in the paper
+    says: str  # the paper
+    found: str  # here
     agrees: bool
-    why: str = ""
+    why: str = ""  # why it differs
+    # what is asked of a number to agree; empty where the words of the paper tell it
     agrees_if: str = ""
 
     def to_dict(self) -> dict[str, object]:

@@ -24,44 +24,22 @@ _OF_CRATERS = {"strength": "Pa", "bit_energy": "J", "returned": "J", "volume": "
 
 @dataclass(frozen=True)
 class Case:
-    """One hole, or several that a prediction cannot tell apart. SI units.
-
-    Attributes
-    ----------
-    id, kind, type : str
-        Type: `TOP` or `DOWN`.
-    bit : float
-        Diameter [m].
-    rock, site : str
-    strength : float
-        Compressive [Pa].
-    rates : tuple of float
-        Measured [m/s]; `rate` is their mean.
-    source : dict of str
-        `published`, `read_in` and `rate`.
-    assumed : str
-        What is not published.
-    power, frequency : float or None
-        Of a top hammer [W, Hz].
-    pressure, piston : float or None
-        At a hammer down the hole [Pa], and diameter of its piston [m].
-    hammer, remark : str
-    """
+    """One hole, or several that a prediction cannot tell apart. SI units."""
 
     id: str
     kind: str
-    type: str
-    bit: float
+    type: str  # `TOP` or `DOWN`
+    bit: float  # diameter [m]
     rock: str
     site: str
-    strength: float
-    rates: tuple[float, ...]
-    source: dict[str, str]
-    assumed: str
-    power: float | None = None
-    frequency: float | None = None
-    pressure: float | None = None
-    piston: float | None = None
+    strength: float  # compressive [Pa]
+    rates: tuple[float, ...]  # measured [m/s]; `rate` is their mean
+    source: dict[str, str]  # `published`, `read_in` and `rate`
+    assumed: str  # what is not published
+    power: float | None = None  # of a top hammer [W]
+    frequency: float | None = None  # of a top hammer [Hz]
+    pressure: float | None = None  # at a hammer down the hole [Pa]
+    piston: float | None = None  # diameter of its piston [m]
     hammer: str = ""
     remark: str = ""
 
@@ -80,26 +58,15 @@ class Case:
 
 @dataclass(frozen=True)
 class Crater:
-    """Crater of one insert on flat rock. SI units.
-
-    Attributes
-    ----------
-    rock, kind, read : str
-    strength : float
-        Compressive [Pa].
-    bit_energy, returned : float
-        Energy of the bit as it comes, and as it goes [J].
-    volume : float
-        [m^3]
-    """
+    """Crater of one insert on flat rock. SI units."""
 
     rock: str
     kind: str
     read: str
-    strength: float
-    bit_energy: float
-    returned: float
-    volume: float
+    strength: float  # compressive [Pa]
+    bit_energy: float  # energy of the bit as it comes [J]
+    returned: float  # as it goes [J]
+    volume: float  # [m^3]
 
     @property
     def crushing(self) -> float:
@@ -109,19 +76,11 @@ class Crater:
 
 @dataclass(frozen=True)
 class Stored:
-    """All that is stored.
-
-    Attributes
-    ----------
-    cases : tuple of Case
-    unused, wanted : tuple of dict of str
-        Rates that are no cases, and what they lack; what could not be read.
-    craters : tuple of Crater
-    """
+    """All that is stored."""
 
     cases: tuple[Case, ...]
-    unused: tuple[dict[str, str], ...]
-    wanted: tuple[dict[str, str], ...]
+    unused: tuple[dict[str, str], ...]  # rates that are no cases, and what they lack
+    wanted: tuple[dict[str, str], ...]  # what could not be read
     craters: tuple[Crater, ...]
 
 

@@ -42,13 +42,7 @@ class RateRow:
 
 @dataclass(frozen=True, repr=False)
 class Rates:
-    """All cases compared.
-
-    Attributes
-    ----------
-    stored : Stored
-    rows : list of RateRow
-    """
+    """All cases compared."""
 
     stored: Stored
     rows: list[RateRow]

@@ -42,24 +42,13 @@ MET, MISSED, NOT_CLAIMED = "met", "missed", "not claimed"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What one criterion says.
-
-    Attributes
-    ----------
-    name, asked : str
-    found : float
-        NaN where there is nothing to tell it from.
-    count : int
-        Cases that it is of.
-    verdict : str
-        `MET`, `MISSED` or `NOT_CLAIMED`.
-    """
+    """What one criterion says."""
 
     name: str
     asked: str
-    found: float
-    count: int
-    verdict: str
+    found: float  # NaN where there is nothing to tell it from
+    count: int  # cases that it is of
+    verdict: str  # `MET`, `MISSED` or `NOT_CLAIMED`
 
 
 def geometric_mean(ratios: Sequence[float]) -> float:

@@ -63,45 +63,22 @@ KINDS_OF_BITS = {TOP: "th", DOWN: "dth"}
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the model tells for a case, SI units.
+    """What the model tells for a case, SI units."""
 
-    Attributes
-    ----------
-    rate, numerical_error : float
-        [m/s]; the error by steps and scatter.
-    low, high : float
-        Rates by the intervals of the rock's numbers, in closed form [m/s].
-    closed_form : float
-        Rate by the closed form with the run's energies [m/s].
-    blow_energy, frequency, crushed : float
-        Of the run: blow energy [J], frequency [Hz], energy into the rock of a blow [J].
-    threshold : float
-        Energy of a blow below which nothing breaks [J].
-    limited : float
-        Share of the closed form's volume that the hole did not gain; below 0 where several blows
-        came upon one place.
-    without_threshold : float
-        Rate by the closed form if the least crushing broke rock [m/s].
-    bit : str
-        Whose buttons were taken.
-    rounds : int
-        Runs that the search for the drive took.
-    motion : str
-    """
-
-    rate: float
-    numerical_error: float
-    low: float
+    rate: float  # [m/s]
+    numerical_error: float  # by steps and scatter [m/s]
+    low: float  # rates by the intervals of the rock's numbers, in closed form [m/s]
     high: float
-    closed_form: float
-    blow_energy: float
-    frequency: float
-    crushed: float
-    threshold: float
+    closed_form: float  # rate by the closed form with the run's energies [m/s]
+    blow_energy: float  # of the run [J]
+    frequency: float  # of the run [Hz]
+    crushed: float  # energy into the rock of a blow [J]
+    threshold: float  # energy of a blow below which nothing breaks [J]
+    # of the closed form's volume that the hole did not gain; below 0: several blows at one place
     limited: float
-    without_threshold: float
-    bit: str
-    rounds: int
+    without_threshold: float  # rate by the closed form if the least crushing broke rock [m/s]
+    bit: str  # whose buttons were taken
+    rounds: int  # runs that the search for the drive took
     motion: str
 
 
