@@ -13,8 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from percussion_model.scene.rows import SceneError
-from percussion_model.simulation.gauge import gauge_force
-from percussion_model.simulation.simulate import Simulation
 
 
 class AtEnd(NamedTuple):
@@ -83,43 +81,3 @@ def at_end(
     path = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
     energies = (impedance * step * float(np.sum(wave**2)) for wave in (came, back))
     return AtEnd(seen, impedance * (came - back), velocity, path, *energies)
-
-
-def gauges_on_bit(
-    simulation: Simulation, times: np.ndarray, places: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray, AtEnd]:
-    """Read two gauges on a uniform bit, and make out its lower end.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Of a bit that is at rest; is advanced through the times.
-    times : ndarray
-        Evenly rising [s].
-    places : (float, float)
-        From the top of the bit, the upper gauge first [m].
-
-    Returns
-    -------
-    upper, lower : ndarray
-        Forces at the gauges [N].
-    AtEnd
-
-    Raises
-    ------
-    SceneError
-        If the bit has several sections, or the places are none of it.
-    """
-    bit = simulation.scene.bit
-    if len(bit.sections) != 1:
-        raise SceneError(f"bit.sections: {len(bit.sections)}: two gauges need a uniform bar")
-    if not 0.0 < places[0] < places[1] < bit.length:
-        raise SceneError(f"gauges at {places!r} m: must rise, within a bit of {bit.length!r} m")
-    section = bit.sections[0]
-    start = simulation.save()
-    upper = gauge_force(simulation, times, places[0])
-    simulation.restore(start)
-    lower = gauge_force(simulation, times, places[1])
-    speed = section.wave_speed
-    apart, below = (places[1] - places[0]) / speed, (bit.length - places[1]) / speed
-    return upper, lower, at_end(times, upper, lower, section.impedance, apart, below)
