@@ -15,15 +15,6 @@ from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
 from percussion_model.simulation.warnings import unused_note
 
-__all__ = [
-    "COMPARED",
-    "Comparison",
-    "compare",
-    "read_solvers",
-    "solver_names",
-    "usual_solvers",
-]
-
 # Numbers of a summary that solvers are compared by.
 COMPARED = (
     "rate_of_penetration",

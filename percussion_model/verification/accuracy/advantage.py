@@ -11,18 +11,6 @@ from typing import NamedTuple
 from percussion_model.verification.accuracy.orders import Cost
 from percussion_model.verification.accuracy.study import PEERS, Study
 
-__all__ = [
-    "MET",
-    "MISSED",
-    "PEER_MISSES",
-    "UNDECIDED",
-    "Bounds",
-    "Contest",
-    "Summary",
-    "contest",
-    "summary",
-]
-
 # How a contest ends: both meet the error; one of them does not; the reference cannot tell, or
 # both meet it with their coarsest rungs.
 MET, PEER_MISSES, MISSED, UNDECIDED = "met", "no peer meets it", "the solver misses it", "undecided"

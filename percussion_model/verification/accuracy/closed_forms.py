@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import Simulation
 
-__all__ = ["ClosedForm", "closed_forms", "solver_error"]
-
 _BARE = {
     "effects.gravity": False,
     "effects.feed": False,

@@ -29,8 +29,6 @@ from percussion_model.verification.accuracy.exact_flow_step import (
 )
 from percussion_model.verification.accuracy.peer import PeerSolver, refuse_uncarried
 
-__all__ = ["ExactFlowSolver"]
-
 # Steps in the bit's transit in which events are looked for: half as many miss short bounces
 # on rock that springs back stiffly, twice as many change nothing that a finer mesh does not.
 WATCH = 8

@@ -57,8 +57,6 @@ from percussion_model.verification.accuracy.explicit_step import (
 )
 from percussion_model.verification.accuracy.peer import PeerSolver, refuse_uncarried
 
-__all__ = ["ExplicitSolver", "explicit_rate"]
-
 # Time step by the longest stable one: there the highest mode would ring on for ever.
 COURANT = 0.9
 CONTACT = JOINT_KINDS.index("contact")

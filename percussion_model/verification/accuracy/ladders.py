@@ -28,18 +28,6 @@ from percussion_model.verification.accuracy.problems import (
     by_modes,
 )
 
-__all__ = [
-    "COMPARED",
-    "LADDERS",
-    "Ladder",
-    "Rung",
-    "affordable_modes",
-    "chosen_ladders",
-    "fem_scene",
-    "ladders",
-    "refuse_asked",
-]
-
 # K_C that goes with ten elements in the piston [N/m]; it rises with the square of their
 # number, so that the error of the penalty falls like that of the mesh.
 STIFFNESS_OF_TEN = 1e12

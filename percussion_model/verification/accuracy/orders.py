@@ -10,8 +10,6 @@ import numpy as np
 
 from percussion_model.simulation.uncertain import with_short_error
 
-__all__ = ["AT_LEAST", "AT_MOST", "Cost", "Order", "cost_at", "cost_range", "fitted_order"]
-
 # Fewer points make no order.
 LEAST_POINTS = 3
 # So many may lie on a line by chance, whatever the order between them.

@@ -13,8 +13,6 @@ from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.solvers.base import Solver
 from percussion_model.solvers.state import State
 
-__all__ = ["PeerSolver", "refuse_uncarried"]
-
 
 def _demands(scene: Any) -> Iterator[tuple[str, str, bool]]:
     """What not all peers carry: its name, what they demand, and whether the scene has it."""

@@ -42,17 +42,6 @@ from percussion_model.verification.accuracy.problems import (
     default_solver,
 )
 
-__all__ = [
-    "Bar",
-    "Reference",
-    "find_reference",
-    "fingerprint",
-    "load_references",
-    "make_reference",
-    "package_store",
-    "save_references",
-]
-
 STORE = "references.json"
 FORMAT = 2
 # Digits of a stored history.

@@ -40,8 +40,6 @@ from percussion_model.verification.accuracy.problems import (
 from percussion_model.verification.accuracy.references import Bar, Reference, find_reference
 from percussion_model.verification.accuracy.timing import interleaved, machine
 
-__all__ = ["WANTED", "Point", "Study", "study"]
-
 # Errors whose cost is told.
 WANTED = (1e-2, 3e-3, 1e-3, 5e-4)
 # Families of ladders that the default solver is compared with: the best of them counts.

@@ -13,8 +13,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Timing", "interleaved", "machine"]
-
 # A method is repeated as long as its repeats take less than this together [s].
 ENOUGH = 1.5
 REPEATS = 5
