@@ -37,7 +37,8 @@ WAVE_STEPS = (6, 10, 16, 24, 40, 60)
 WAVE_STEPS_FULL = (*WAVE_STEPS, 90)
 # Modes in the bar of the shortest transit time. They are computed in eights: of numbers that
 # fill as many eights the largest is taken.
-MODES, MODES_FULL = (2, 4, 6, 8, 14, 20, 28, 40, 56), (2, 4, 6, 8, 14, 20, 28, 40, 56, 80)
+MODES = (2, 4, 6, 8, 14, 20, 28, 40, 56)
+MODES_FULL = (*MODES, 80)
 EIGHT = 8
 # Modes of the longer bar: with more, each rung takes half a minute to be prepared.
 MOST_MODES = 400
@@ -46,7 +47,8 @@ STRING_MESHES = (5, 7, 10, 15, 20, 30)
 STRING_MESHES_FULL = (*STRING_MESHES, 45)
 # Steps and elements of aperiodic motion: with rods, and of two bars.
 STRING_STEPS_LONG, STEPS_LONG, MESH_LONG = 16, 20, 20
-MESHES, MESHES_FULL = (10, 20, 30, 50, 70), (10, 20, 30, 50, 70, 100)
+MESHES = (10, 20, 30, 50, 70)
+MESHES_FULL = (*MESHES, 100)
 
 # Compiled peers, their meshes, and the most elements in all bars: those of the exact flow
 # have dense matrices.
@@ -148,6 +150,11 @@ class Rung:
     # makes a peer's solver of the scene; None for the solver that the scene names
     peer: Callable[[Scene], Solver] | None = None
 
+    @property
+    def name(self) -> str:
+        """Method and effort, as in "wave, 24 steps"."""
+        return f"{self.ladder}, {self.label}"
+
 
 def chosen_ladders(words: Sequence[str] | None) -> tuple[str, ...]:
     """Names of ladders from words; "compared" stands for own solvers and their quick peers.
@@ -210,15 +217,35 @@ def ladders(problem: Problem, full: bool = False) -> list[Rung]:
     """
     if problem.kind == APERIODIC:
         return list(_rising_durations(problem, full))
-    if problem.scene.effects.string:
-        return [*_waves(problem, full), *_elements_of_string(problem, full)]
+    scene = problem.scene
+    waves = [wave_rung(scene, steps) for steps in (WAVE_STEPS_FULL if full else WAVE_STEPS)]
+    if scene.effects.string:
+        meshes = STRING_MESHES_FULL if full else STRING_MESHES
+        return waves + [peer_rung("explicit", scene, count) for count in meshes]
     return [
-        *_modes(problem, full),
-        *_waves(problem, full),
-        *_compiled(problem, full),
-        *_elements(problem, full),
-        Rung("rigid", "", 1.0, problem.scene.computed_by("rigid")),
+        *_modes(scene, full),
+        *waves,
+        *_compiled(scene, full),
+        *_elements(scene, full),
+        Rung("rigid", "", 1.0, scene.computed_by("rigid")),
     ]
+
+
+def wave_rung(scene: Scene, steps: int) -> Rung:
+    """Waves that cross the first elastic bar in so many steps."""
+    chosen = scene.computed_by("wave", **{"solver.cells": steps})
+    return Rung("wave", f"{steps} steps", 1.0 / steps, chosen)
+
+
+def modal_rung(scene: Scene, modes: int) -> Rung:
+    """So many modes in the bar of the shortest transit time."""
+    return Rung("modal", f"{modes} modes", 1.0 / modes, by_modes(scene, modes))
+
+
+def peer_rung(name: str, scene: Scene, elements: int) -> Rung:
+    """So many elements of a compiled peer in the first bar."""
+    peer = partial(COMPILED[name][0], elements=elements)
+    return Rung(name, f"{elements} elements", 1.0 / elements, scene, peer=peer)
 
 
 def total_length(scene: Scene) -> float:
@@ -252,22 +279,13 @@ def affordable_modes(scene: Scene, wished: Sequence[int]) -> list[int]:
     return list(by_eights.values()) or [wished[0]]
 
 
-def _modes(problem: Problem, full: bool) -> Iterator[Rung]:
-    scene = problem.scene
+def _modes(scene: Scene, full: bool) -> list[Rung]:
     counts = affordable_modes(scene, MODES_FULL if full else MODES)
     try:
         _modal(scene, PILOT_MODES)
     except SceneError:  # its note will tell why
-        yield Rung("modal", "", 1.0, scene, peer=partial(_modal, modes=PILOT_MODES))
-        return
-    for count in counts:
-        yield Rung("modal", f"{count} modes", 1.0 / count, by_modes(scene, count))
-
-
-def _elements_of_string(problem: Problem, full: bool) -> Iterator[Rung]:
-    for count in STRING_MESHES_FULL if full else STRING_MESHES:
-        peer = partial(ExplicitSolver, elements=count)
-        yield Rung("explicit", f"{count} elements", 1.0 / count, problem.scene, peer=peer)
+        return [Rung("modal", "", 1.0, scene, peer=partial(_modal, modes=PILOT_MODES))]
+    return [modal_rung(scene, count) for count in counts]
 
 
 def even_mesh(scene: Scene, about: int) -> int:
@@ -287,14 +305,7 @@ def even_mesh(scene: Scene, about: int) -> int:
     return min(counts or [about], key=unevenness)
 
 
-def _waves(problem: Problem, full: bool) -> Iterator[Rung]:
-    for steps in WAVE_STEPS_FULL if full else WAVE_STEPS:
-        chosen = problem.scene.computed_by("wave", **{"solver.cells": steps})
-        yield Rung("wave", f"{steps} steps", 1.0 / steps, chosen)
-
-
-def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
-    scene = problem.scene
+def _elements(scene: Scene, full: bool) -> Iterator[Rung]:
     meshes = MESHES_FULL if full else MESHES
     counts = _affordable(scene, (5, *meshes), MOST_ELEMENTS if full else MOST_ELEMENTS / 2)
     for count in counts:
@@ -312,8 +323,7 @@ def _elements(problem: Problem, full: bool) -> Iterator[Rung]:
         yield Rung("fem-gauss", f"{count} elements", 1.0 / count, chosen)
 
 
-def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
-    scene = problem.scene
+def _compiled(scene: Scene, full: bool) -> Iterator[Rung]:
     for name, (make, meshes, most) in COMPILED.items():
         try:
             make(scene, meshes[0])
@@ -322,9 +332,7 @@ def _compiled(problem: Problem, full: bool) -> Iterator[Rung]:
             counts = [meshes[0]]  # its note will tell why
         if name == "explicit" and len(counts) > 1:
             counts = sorted({even_mesh(scene, count) for count in counts})
-        for count in counts:
-            peer = partial(make, elements=count)
-            yield Rung(name, f"{count} elements", 1.0 / count, scene, peer=peer)
+        yield from (peer_rung(name, scene, count) for count in counts)
 
 
 def _rising_durations(problem: Problem, full: bool) -> Iterator[Rung]:

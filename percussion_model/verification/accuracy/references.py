@@ -14,22 +14,24 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.files import staged_file
-from percussion_model.solvers.base import Solver
 from percussion_model.verification.accuracy.explicit import ExplicitSolver
 from percussion_model.verification.accuracy.ladders import (
+    Rung,
     affordable_modes,
     fem_scene,
+    modal_rung,
+    peer_rung,
     total_length,
+    wave_rung,
 )
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
@@ -38,7 +40,6 @@ from percussion_model.verification.accuracy.problems import (
     Answer,
     Problem,
     Run,
-    by_modes,
     default_solver,
 )
 
@@ -284,17 +285,7 @@ def make_reference(
     return Reference(scene.title, problem.kind, bars, answers[base][-1].histories, made)
 
 
-class Level(NamedTuple):
-    """A solver at one resolution."""
-
-    name: str
-    scene: Scene
-    size: float  # of a step or element, by that of the first bar
-    # makes explicit elements; None for the solver that the scene names
-    peer: Callable[[Scene], Solver] | None = None
-
-
-def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
+def _levels(problem: Problem, quick: bool) -> dict[str, list[Rung]]:
     """Levels of each solver, coarse to fine."""
     scene, lengths = problem.scene, total_length(problem.scene)
     waves = WAVE_LEVELS_QUICK if quick else WAVE_LEVELS
@@ -307,12 +298,14 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
     else:
         counts = [max(2, round(target / lengths)) for target in waves]
         meshes = [max(3, round(target / lengths)) for target in explicit]
-    found = {"wave": [_wave_level(scene, count) for count in counts]}
+    found = {"wave": [wave_rung(scene, count) for count in counts]}
     if default_solver(scene) == "modal":
-        found["modal"] = _modal_levels(problem, quick)
+        wished = MODES_QUICK if quick else MODES
+        modes = affordable_modes(scene, (LONG_MODES,) if problem.kind == APERIODIC else wished)
+        found["modal"] = [modal_rung(scene, count) for count in modes]
     try:
         ExplicitSolver(scene, meshes[0])
-        found["explicit"] = [_explicit_level(scene, count) for count in meshes]
+        found["explicit"] = [peer_rung("explicit", scene, count) for count in meshes]
         if quick or problem.kind == APERIODIC:
             return found
     except SceneError:
@@ -325,55 +318,33 @@ def _levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
     return found
 
 
-def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Level]]:
+def _string_levels(problem: Problem, quick: bool) -> dict[str, list[Rung]]:
     """Levels where bars lie between piston and bit: of waves and of explicit elements."""
     scene, counts = problem.scene, STRING_LEVELS[: 2 if quick else 3]
     steps, meshes = counts, counts
     if problem.kind == APERIODIC:
         steps, meshes = (LONG_CELLS,), (LONG_MESH,)
-    found = {"wave": [_wave_level(scene, count) for count in steps]}
+    found = {"wave": [wave_rung(scene, count) for count in steps]}
     try:
         ExplicitSolver(scene, meshes[0])
     except SceneError:
         return found
-    return found | {"explicit": [_explicit_level(scene, count) for count in meshes]}
+    return found | {"explicit": [peer_rung("explicit", scene, count) for count in meshes]}
 
 
-def _modal_levels(problem: Problem, quick: bool) -> list[Level]:
-    scene = problem.scene
-    if problem.kind == APERIODIC:
-        wished: tuple[int, ...] = (LONG_MODES,)
-    else:
-        wished = MODES_QUICK if quick else MODES
-    return [
-        Level(f"modal, {n} modes", by_modes(scene, n), 1.0 / n)
-        for n in affordable_modes(scene, wished)
-    ]
+def _fem_level(scene: Scene, count: int, stiffness: float) -> Rung:
+    label = f"{count} elements, CFL 1, K_C {stiffness:.3g} N/m"
+    return Rung("fem", label, 1.0 / count, fem_scene(scene, count, 1.0, stiffness))
 
 
-def _wave_level(scene: Scene, count: int) -> Level:
-    chosen = scene.computed_by("wave", **{"solver.cells": count})
-    return Level(f"wave, {count} steps", chosen, 1.0 / count)
-
-
-def _explicit_level(scene: Scene, count: int) -> Level:
-    peer = partial(ExplicitSolver, elements=count)
-    return Level(f"explicit, {count} elements", scene, 1.0 / count, peer=peer)
-
-
-def _fem_level(scene: Scene, count: int, stiffness: float) -> Level:
-    name = f"fem, {count} elements, CFL 1, K_C {stiffness:.3g} N/m"
-    return Level(name, fem_scene(scene, count, 1.0, stiffness), 1.0 / count)
-
-
-def _answer(problem: Problem, level: Level) -> Answer:
+def _answer(problem: Problem, level: Rung) -> Answer:
     if problem.kind == APERIODIC:
         problem = replace(problem, duration=LONG * problem.duration)
     return Run(problem, level.scene, level.peer).answer()
 
 
 def _limit(
-    answers: Sequence[Answer], levels: Sequence[Level], key: str, order: float | None
+    answers: Sequence[Answer], levels: Sequence[Rung], key: str, order: float | None
 ) -> tuple[float, float]:
     """Extrapolate the last two levels; the bar is what the last two steps of it changed.
 
@@ -397,7 +368,7 @@ def _limit(
     return limits[-1], max(abs(limits[-1] - limits[-2]), 0.5 * change)
 
 
-def _remains(levels: Sequence[Level], order: float) -> float:
+def _remains(levels: Sequence[Rung], order: float) -> float:
     """Error of the finer of two levels by the change between them."""
     return 1.0 / ((levels[0].size / levels[1].size) ** order - 1.0)
 
@@ -425,7 +396,7 @@ def _agree(limits: dict[str, tuple[float, float]], seen: Sequence[float] = ()) -
     return Bar(value, max(error, off, spread), limits, agreed)
 
 
-def _history_bar(levels: dict[str, list[Level]], answers: dict[str, list[Answer]], key: str) -> Bar:
+def _history_bar(levels: dict[str, list[Rung]], answers: dict[str, list[Answer]], key: str) -> Bar:
     """L1 distance of the finest waves to the second solver, the modes, or the waves before.
 
     The limits carry what is left of their error, which decides whether they agree.
