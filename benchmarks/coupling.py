@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
+from percussion_model.simulation import markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 STEP = 1e-3  # [s]
@@ -94,13 +95,10 @@ def by_part(system: Path, parameters: dict[str, Any]) -> dict[tuple[str, str], f
 def table(spent: dict[tuple[str, str], float]) -> str:
     """Markdown: microseconds a step."""
     parts = list(dict.fromkeys(part for part, _ in spent))
-    lines = ["| part | set inputs | step | read outputs | all |", "|---|---|---|---|---|"]
     rows = [(part, [1e6 * spent[part, call] for call in CALLS]) for part in parts]
     rows.append(("together", [sum(values) for values in zip(*(r for _, r in rows), strict=True)]))
-    for part, values in rows:
-        shown = " | ".join(f"{value:.1f}" for value in [*values, sum(values)])
-        lines.append(f"| {part} | {shown} |")
-    return "\n".join(lines)
+    lines = [[part, *(f"{one:.1f}" for one in (*values, sum(values)))] for part, values in rows]
+    return markdown.table(("part", "set inputs", "step", "read outputs", "all"), lines)
 
 
 def line(system: Path, run: CoupledRun) -> str:

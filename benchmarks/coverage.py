@@ -21,6 +21,7 @@ import numpy as np
 
 from percussion_model import Scene, simulate
 from percussion_model.scene.numbers import numbers_of
+from percussion_model.simulation import markdown
 from percussion_model.solvers.modal.resolution import most_modes
 from percussion_model.verification.accuracy.explicit import explicit_rate
 
@@ -175,7 +176,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         ),
         ("median stated error, relative", f"{stated:.1e}"),
     ]
-    return "\n".join(["| what | value |", "|---|---|", *(f"| {a} | {b} |" for a, b in lines)])
+    return markdown.table(("what", "value"), lines)
 
 
 def main() -> None:

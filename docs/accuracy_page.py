@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from percussion_model.interface.commands.accuracy_tables import (
     bounds_text,
     ratio_text,
@@ -21,6 +21,7 @@ from percussion_model.interface.commands.accuracy_tables import (
     why_text,
     within_bar,
 )
+from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.verification.accuracy import Study
 from percussion_model.verification.accuracy.advantage import (
@@ -216,13 +217,16 @@ def advantage() -> str:
 
     def row(
         name: str, chosen: Sequence[Study], ladder: str = "", duration: float = math.inf
-    ) -> str:
+    ) -> list[str]:
         found = contests(chosen, ladder=ladder, duration=duration)
-        cells = (summary_text(summary(found[wanted])) for wanted in STATED)
-        return f"| {name} | {' | '.join(cells)} |"
+        return [name, *(summary_text(summary(found[wanted])) for wanted in STATED)]
 
     every = list(studies.values())
-    heads = " | ".join(f"error of {percent(wanted)}" for wanted in STATED)
+    rows = (
+        row("**the default solver**", every),
+        row(f"with set-up, runs of {RUN:g} s", every, duration=RUN),
+        row("waves", waved, "wave"),
+    )
     text = (
         "Processor time of the best compiled peer, mostly explicit elements with hard contact, "
         "divided by that of the default solver (modes; in drill strings waves) for the same "
@@ -230,17 +234,9 @@ def advantage() -> str:
         "bounds, where no setting was so coarse that it misses the error, or so fine that it "
         f"meets it. {lost(list(studies), contests(every))}"
     )
-    return "\n".join(
-        (
-            textwrap.fill(text, 88, break_long_words=False, break_on_hyphens=False),
-            "",
-            f"| | {heads} |",
-            f"|---|{'---|' * len(STATED)}",
-            row("**the default solver**", every),
-            row(f"with set-up, runs of {RUN:g} s", every, duration=RUN),
-            row("waves", waved, "wave"),
-        )
-    )
+    text = textwrap.fill(text, 88, break_long_words=False, break_on_hyphens=False)
+    shown = table(["", *(f"error of {percent(wanted)}" for wanted in STATED)], rows)
+    return f"{text}\n\n{shown}"
 
 
 def modes_table() -> str:

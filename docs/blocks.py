@@ -1,4 +1,4 @@
-"""Tables in Markdown, and pages whose blocks are made anew.
+"""Pages whose blocks are made anew.
 
 A block stands between `<!-- begin NAME -->` and `<!-- end -->`.
 """
@@ -6,17 +6,10 @@ A block stands between `<!-- begin NAME -->` and `<!-- end -->`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 BLOCK = re.compile(r"(<!-- begin (\w+) -->)\n.*?(<!-- end -->)", re.DOTALL)
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: bool = False) -> str:
-    """Markdown of a table; `numbers`: all columns but the first stand at the right."""
-    columns = "|---" + ("|---:" if numbers else "|---") * (len(head) - 1) + "|"
-    lines = [f"| {' | '.join(row)} |" for row in (head, *rows)]
-    return "\n".join([lines[0], columns, *lines[1:]])
 
 
 def renewed(page: Path, blocks: Mapping[str, str | Callable[[], str]]) -> str:

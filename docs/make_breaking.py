@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
 from percussion_model.scene.bits import bit, bit_of
@@ -22,6 +22,7 @@ from percussion_model.scene.hammers import hammer, hammers
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.text import write_text
+from percussion_model.simulation.markdown import table
 
 HERE = Path(__file__).resolve().parent
 ROCKS = ("kuru-granite", "st-anne-limestone", "sierra-white-granite")

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from docs.blocks import table
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import CoupledRun, known_signals, summary
 from percussion_model.interface.progress import progress
 from percussion_model.scene.text import write_text
+from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import in_digits, with_error
 from scenarios import coupling_step, step_rejection
 from scenarios.results import system, tell

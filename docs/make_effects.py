@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from percussion_model import Scene
 from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting.effect_bars import draw_effects
 from percussion_model.interface.plotting.style import save_figures
+from percussion_model.simulation.markdown import table
 from percussion_model.verification.accuracy.timing import machine
 
 HERE = Path(__file__).resolve().parent
@@ -25,7 +26,8 @@ def block(found: EffectsStudy, computer: dict[str, object]) -> str:
     result = found.base.result
     cells = " + ".join(str(count) for count in result.cells.values())
     headings, rows, reasons = table_of(found)
-    shown = table([heading.replace("\n", ", ") for heading in headings], rows, numbers=True)
+    head = [heading.replace("\n", ", ") for heading in headings]
+    shown = table(head, rows, left=head[:1])
     dashes = "\n".join(f"- *{name}*: {reason}." for name, reason in reasons.items())
     return (
         f"Reference scene by waves, {cells} cells, {result.duration:g} s simulated; "

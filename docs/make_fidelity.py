@@ -6,8 +6,9 @@ import math
 import time
 from pathlib import Path
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from percussion_model import Scene, Simulation, simulate
+from percussion_model.simulation.markdown import table
 
 PAGE = Path(__file__).with_name("fidelity.md")
 

@@ -11,9 +11,9 @@ from typing import Any
 
 from fmpy import read_model_description
 
-from docs.blocks import table
 from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
+from percussion_model.simulation.markdown import table
 
 HEADINGS = ("name", "unit", "shown in", "start", "range", "meaning", "reference")
 PAGE = Path(__file__).parent / "data" / "fmu_interface.md"

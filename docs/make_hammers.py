@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import fill
 
-from docs.blocks import table
 from percussion_model.interface.commands.hammers import HEADINGS, NOTE, cells, number_cells
 from percussion_model.scene.hammers.library import (
     StoredHammer,
@@ -14,6 +13,7 @@ from percussion_model.scene.hammers.library import (
     stored_hammer,
     stored_hammers,
 )
+from percussion_model.simulation.markdown import table
 
 PAGE = Path(__file__).parent / "data" / "hammers.md"
 HEAD = f"""# Hammers on the market

@@ -12,7 +12,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from docs.blocks import table
+from percussion_model.simulation.markdown import table
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "data" / "paper_statements.md"

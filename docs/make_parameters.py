@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import groupby
 from pathlib import Path
 
-from docs.blocks import table
 from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table
 from percussion_model.scene.rows import ParameterRow, short_number, toml_value
+from percussion_model.simulation.markdown import table
 
 HEAD = """# Parameters
 

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from docs.blocks import table
 from percussion_model.analysis.study.response import FOUND, KINDS
 from percussion_model.physics.records import (
     BLOW_COLUMNS,
@@ -18,6 +17,7 @@ from percussion_model.physics.records import (
     Mode,
 )
 from percussion_model.simulation.columns import ENERGY_COLUMNS, SUMMARY_COLUMNS
+from percussion_model.simulation.markdown import table
 
 FOLDER = Path(__file__).with_name("reference")
 MADE = "This page is written by `python -m docs.make_reference`."

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import fill
 
-from docs.blocks import table
 from percussion_model.interface.commands.bits import HEADINGS as BIT_HEADINGS
 from percussion_model.interface.commands.bits import NOTE as BIT_NOTE
 from percussion_model.interface.commands.bits import cells as bit_cells
@@ -22,6 +21,7 @@ from percussion_model.scene.bits import bit, bits
 from percussion_model.scene.rocks import REFERENCE, STIFFNESS, Number, Rock, rock, rocks
 from percussion_model.scene.rocks.breaking import breaking_numbers
 from percussion_model.scene.rocks.derived import button_stiffness, mean_factor, pressure_factors
+from percussion_model.simulation.markdown import table
 
 PAGE = Path(__file__).with_name("rocks.md")
 HEAD = f"""# Rocks and bits

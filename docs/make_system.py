@@ -8,11 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from docs.drawings.system import SYSTEM, connected
 from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import read_plan
 from fmu_src.variables import Variable
+from percussion_model.simulation.markdown import table
 
 PAGE = Path(__file__).with_name("system.md")
 VARIABLES = Path(__file__).parent / "data" / "system_variables.md"

@@ -13,10 +13,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
 from percussion_model.scene.text import write_text
+from percussion_model.simulation.markdown import table
 from percussion_model.simulation.warnings import least_loss_time
 
 HERE = Path(__file__).resolve().parent

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from docs.blocks import renewed, table
+from docs.blocks import renewed
 from percussion_model import Result, simulate
 from percussion_model.analysis.drill_string import StringReport, string_report
 from percussion_model.interface.plotting.drill_string import bar_title, draw_string
 from percussion_model.interface.plotting.style import save_figures
 from percussion_model.scene.hammers import hammer, hammers
 from percussion_model.scene.text import write_text
+from percussion_model.simulation.markdown import table
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "top_hammer.md"
@@ -73,7 +74,7 @@ def presets() -> str:
             )
     head = ["hammer", "rods", "frequency, Hz", "impact, m/s", "blow, J", "efficiency, %"]
     head += ["rate, mm/s", "peak bit force, kN", "speed"]
-    return table(head, rows, numbers=True)
+    return table(head, rows, left=head[:1])
 
 
 def shares() -> str:
@@ -86,7 +87,7 @@ def shares() -> str:
         given = energy["input"] - energy["friction"]
         rows.append([str(rods), *(f"{100 * part / given:.1f}" for part in taken)])
     head = ["rods", "rock, %", "structural loss, %", "damper, %", "numerical, %"]
-    return table(head, rows, numbers=True)
+    return table(head, rows, left=head[:1])
 
 
 def changes() -> str:
@@ -102,7 +103,7 @@ def changes() -> str:
                 f"{1e3 * found['rate_of_penetration']:.0f}",
             ]
         )
-    return table(["", "blow, J", "efficiency, %", "rate, mm/s"], rows, numbers=True)
+    return table(["", "blow, J", "efficiency, %", "rate, mm/s"], rows, left=("",))
 
 
 def joints(report: StringReport) -> str:
@@ -120,7 +121,7 @@ def joints(report: StringReport) -> str:
         for name, one in report.joints.items()
     ]
     head = ["joint", "came, J", "passed, J", "returned, J", "net, J", "of the first wave, %"]
-    return table([*head, "greatest tension, kN"], rows, numbers=True)
+    return table([*head, "greatest tension, kN"], rows, left=head[:1])
 
 
 def stresses(report: StringReport) -> str:
@@ -132,7 +133,7 @@ def stresses(report: StringReport) -> str:
             cells += [f"{sign * 1e-6 * extreme.value:.0f}", f"{extreme.place:.2f}"]
         rows.append(cells)
     head = ["bar", "compression, MPa", "at, m", "tension, MPa", "at, m"]
-    return table(head, rows, numbers=True)
+    return table(head, rows, left=head[:1])
 
 
 def at_the_rock(report: StringReport) -> str:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.interface.progress import progress
+from percussion_model.simulation import markdown
 from percussion_model.simulation.files import staged_file
 
 from .drawing import in_style
@@ -117,8 +118,7 @@ def study(
 
 def table(found: dict[str, list[dict[str, Any]]]) -> str:
     """Text of a table, Markdown."""
-    lines = ["| loop | step, s | error of the advance | blows | time a simulated second, s |"]
-    lines.append("|---|---|---|---|---|")
+    lines = []
     for case, rows in found.items():
         for row in rows:
             if row["same_bits"]:
@@ -128,9 +128,9 @@ def table(found: dict[str, list[dict[str, Any]]]) -> str:
             else:
                 error = f"{row['error']:.1e}"
             blows = "–" if math.isnan(row["blow_count"]) else f"{row['blow_count']:.0f}"
-            cells = (case, f"{row['step']:.2g}", error, blows, f"{row['cost']:.3g}")
-            lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+            lines.append((case, f"{row['step']:.2g}", error, blows, f"{row['cost']:.3g}"))
+    head = ("loop", "step, s", "error of the advance", "blows", "time a simulated second, s")
+    return markdown.table(head, lines)
 
 
 @in_style

@@ -18,6 +18,7 @@ import numpy as np
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.coupled_run import known_signals, summary
 from percussion_model.interface.progress import progress
+from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import change_text, with_error
 from percussion_model.verification.accuracy.orders import Order, fitted_order
 
@@ -109,40 +110,40 @@ def order_of(rows: Sequence[OneBlow], exact: OneBlow, name: str) -> Order | None
 
 def table_of_one(rows: Sequence[OneBlow], exact: OneBlow) -> str:
     """Markdown: relative errors, and the order of each quantity in the last row."""
-    words = [f"{text} [{unit}]" for text, unit, _ in QUANTITIES.values()]
-    lines = [f"| order | step [ms] | {' | '.join(words)} |", "|---|---|" + "---|" * len(words)]
+    words = (f"{text} [{unit}]" for text, unit, _ in QUANTITIES.values())
     unsure = errors_of_limits(rows, exact)
     found = [
         with_error(factor * exact.values[name], factor * abs(exact.values[name]) * unsure[name])
         for name, (_, _, factor) in QUANTITIES.items()
     ]
-    lines.append(f"| limit | | {' | '.join(found)} |")
+    lines = [["limit", "", *found]]
     for order in dict.fromkeys(row.order for row in rows):
         chosen = [row for row in rows if row.order == order]
         columns = [errors(chosen, exact, name) for name in QUANTITIES]
         for row, sizes in zip(chosen, np.transpose(columns), strict=True):
-            shown = " | ".join(map(change_text, sizes, unsure.values()))
-            lines.append(f"| {order} | {1e3 * row.step:g} | {shown} |")
-        slopes = " | ".join(str(order_of(chosen, exact, name) or "-") for name in QUANTITIES)
-        lines.append(f"| {order} | slope to {1e3 * UNCHANGED:g} | {slopes} |")
-    return "\n".join(lines)
+            shown = map(change_text, sizes, unsure.values())
+            lines.append([order, f"{1e3 * row.step:g}", *shown])
+        slopes = (str(order_of(chosen, exact, name) or "-") for name in QUANTITIES)
+        lines.append([order, f"slope to {1e3 * UNCHANGED:g}", *slopes])
+    return table(("order", "step [ms]", *words), lines)
 
 
 def table_of_eight(rows: Sequence[EightBlows]) -> str:
     """Markdown: changes of the rate against that of the shortest step."""
     exact = min(rows, key=lambda row: row.step)
+    head = (
+        *("order", "step [ms]", "rate [mm/s]", f"change from {1e3 * exact.step:g} ms [%]"),
+        *("mean feed [N]", "shoulder divided by blows [%]"),
+    )
     lines = [
-        f"| order | step [ms] | rate [mm/s] | change from {1e3 * exact.step:g} ms [%] "
-        "| mean feed [N] | shoulder divided by blows [%] |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        lines.append(
-            f"| {row.order} | {1e3 * row.step:g} | {1e3 * row.rate:.2f} "
-            f"| {change_text(row.rate / exact.rate - 1.0, None)} | {row.feed:.0f} "
-            f"| {100 * row.shoulder:+.2f} |"
+        (
+            row.order, f"{1e3 * row.step:g}", f"{1e3 * row.rate:.2f}",
+            change_text(row.rate / exact.rate - 1.0, None), f"{row.feed:.0f}",
+            f"{100 * row.shoulder:+.2f}",
         )
-    return "\n".join(lines)
+        for row in rows
+    ]  # fmt: skip
+    return table(head, lines)
 
 
 @in_style

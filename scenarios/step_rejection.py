@@ -15,6 +15,7 @@ from typing import Any
 
 from percussion_model.coupling import CoupledRun, Coupling
 from percussion_model.interface.progress import progress
+from percussion_model.simulation import markdown
 from percussion_model.simulation.files import staged_texts
 from percussion_model.simulation.uncertain import change_text
 
@@ -73,23 +74,17 @@ def attempt(archive: Path, shoulder: str, step: float, tolerance: float | None =
 
 def table(exact: Mapping[str, CoupledRun], tries: Sequence[Try]) -> str:
     """Markdown: errors at the end of the blow, in per cent."""
-    words = " | ".join(f"{name} [%]" for name in QUANTITIES.values())
-    lines = [
-        f"| shoulder | steps | done | computed | taken back | time [s] | {words} |",
-        "|---|---|---|---|---|---|" + "---|" * len(QUANTITIES),
-    ]
+    rows = []
     for one in tries:
         same = [other for other in tries if other.shoulder == one.shoulder]
-        shown = " | ".join(
+        shown = (
             change_text(_change(one, exact, name), _error_of_limit(same, exact, name))
             for name in QUANTITIES
         )
-        run = one.run
-        lines.append(
-            f"| {one.shoulder} | {one.way} | {run.steps} | {run.steps + run.tried} "
-            f"| {run.rejected} | {one.cost:.2f} | {shown} |"
-        )
-    return "\n".join(lines)
+        counts = one.run.steps, one.run.steps + one.run.tried, one.run.rejected
+        rows.append([one.shoulder, one.way, *map(str, counts), f"{one.cost:.2f}", *shown])
+    head = ("shoulder", "steps", "done", "computed", "taken back", "time [s]")
+    return markdown.table([*head, *(f"{name} [%]" for name in QUANTITIES.values())], rows)
 
 
 def _change(one: Try, exact: Mapping[str, CoupledRun], name: str) -> float:

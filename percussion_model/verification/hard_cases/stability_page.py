@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from percussion_model.simulation.markdown import table
 from percussion_model.verification.hard_cases.cases import hard_cases
 from percussion_model.verification.hard_cases.collection import (
     DISAGREE,
@@ -24,6 +25,11 @@ GROUPS = {
     "chains": "Drill strings",
     "inputs": "Inputs that change during the run",
 }
+
+HEADINGS = (
+    *("case", "solver", "rate, mm/s", "residual", "numerical", "momentum"),
+    *("events", "guards", "refined", "speed"),
+)
 
 _INTRODUCTION = """# Hard cases: all runs
 
@@ -96,6 +102,17 @@ def verdict(found: Collection) -> str:
 
 
 def _disagreements(found: Collection) -> str:
+    rows = []
+    for entry in found.disagreements():
+        of_case = {row["solver"]: row for row in found.rows if row["case"] == entry["case"]}
+        first = entry["compared_with"]
+        rows.append(
+            (
+                entry["case"], entry["solver"], short_rate(of_case[entry["solver"]]),
+                f"{short_rate(of_case[first])} ({first})", off_text(entry),
+                entry["reason"] or "**not known**",
+            )
+        )  # fmt: skip
     lines = [
         "## Where solvers disagree",
         "",
@@ -104,20 +121,20 @@ def _disagreements(found: Collection) -> str:
         "undecided where it lies within three standard errors of the scatter and what finer grids "
         "change.",
         "",
-        "| case | solver | rate, mm/s | first solver, mm/s | off | reason |",
-        "|---|---|---|---|---|---|",
+        table(("case", "solver", "rate, mm/s", "first solver, mm/s", "off", "reason"), rows),
+        "",
     ]
-    for entry in found.disagreements():
-        rows = {row["solver"]: row for row in found.rows if row["case"] == entry["case"]}
-        lines.append(
-            f"| {entry['case']} | {entry['solver']} | {short_rate(rows[entry['solver']])} "
-            f"| {short_rate(rows[entry['compared_with']])} ({entry['compared_with']}) "
-            f"| {off_text(entry)} | {entry['reason'] or '**not known**'} |"
-        )
-    return "\n".join([*lines, ""])
+    return "\n".join(lines)
 
 
 def _unresolved(found: Collection) -> str:
+    rows = [
+        (
+            row["case"], row["solver"], _percent(row["refined_rate_change"]),
+            _plain(row["refined_rate_sigmas"]), _plain(row["refined_periods_chance"]),
+        )
+        for row in found.unresolved()
+    ]  # fmt: skip
     lines = [
         "## What a finer grid changes",
         "",
@@ -126,15 +143,12 @@ def _unresolved(found: Collection) -> str:
         f"distribution of periods changes: by chance it would with less than {LEAST_CHANCE:g}. The "
         "default does not resolve these; it resolves all others.",
         "",
-        "| case | solver | rate changes by | standard errors | chance of the periods |",
-        "|---|---|---|---|---|",
+        table(
+            ("case", "solver", "rate changes by", "standard errors", "chance of the periods"), rows
+        ),
+        "",
     ]
-    lines += [
-        f"| {row['case']} | {row['solver']} | {_percent(row['refined_rate_change'])} "
-        f"| {_plain(row['refined_rate_sigmas'])} | {_plain(row['refined_periods_chance'])} |"
-        for row in found.unresolved()
-    ]
-    return "\n".join([*lines, ""])
+    return "\n".join(lines)
 
 
 def _group(found: Collection, group: str) -> str:
@@ -145,29 +159,20 @@ def _group(found: Collection, group: str) -> str:
     lines = [f"### {GROUPS[group]}", ""]
     shown = {row["case"] for row in rows}
     lines += [f"- **{n}**: {c.hard}. Holds: {c.holds}." for n, c in cases.items() if n in shown]
-    lines += [
-        "",
-        "| case | solver | rate, mm/s | residual | numerical | momentum | events | guards "
-        "| refined | speed |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-        *(_row(row, cases[row["case"]].aperiodic) for row in rows),
-        "",
-    ]
-    return "\n".join(lines)
+    runs = table(HEADINGS, (_row(row, cases[row["case"]].aperiodic) for row in rows))
+    return "\n".join([*lines, "", runs, ""])
 
 
-def _row(row: dict[str, Any], aperiodic: bool) -> str:
-    rate = short_rate(row)
+def _row(row: dict[str, Any], aperiodic: bool) -> tuple[str, ...]:
     refined = _percent(row.get("refined_rate_change"))
     if aperiodic and row.get("refined_rate_sigmas") is not None:
         refined = f"{row['refined_rate_sigmas']:.1f} σ"
     speed = row["duration"] / row["wall_time"] if row["wall_time"] else None
+    sizes = (_small(row[name]) for name in ("residual", "numerical", "momentum"))
     return (
-        f"| {row['case']} | {row['solver']} | {rate} | {_small(row['residual'])} "
-        f"| {_small(row['numerical'])} | {_small(row['momentum'])} "
-        f"| {_plain(row['events_per_second'], 3)} | {row['guards'] or ''} | {refined} "
-        f"| {_plain(speed)} |"
-    )
+        row["case"], row["solver"], short_rate(row), *sizes, _plain(row["events_per_second"], 3),
+        str(row["guards"] or ""), refined, _plain(speed),
+    )  # fmt: skip
 
 
 def _small(value: float | None) -> str:

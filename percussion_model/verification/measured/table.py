@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, fields
 
+from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import in_digits, with_short_error
 from percussion_model.verification.measured.comparison import (
     FITTED,
@@ -215,19 +216,22 @@ def markdown(found: Comparison) -> Iterator[str]:
             fit = found.found(one.name, plan.name)
             yield f"**Law {plan.law}, fit {plan.name}**: {parameters_text(fit)}."
             yield ""
-            yield from _table(HEADINGS, map(_emphasised, found.of(one.name, plan.name)))
+            yield table(HEADINGS, map(_emphasised, found.of(one.name, plan.name)), OF_WORDS)
+            yield ""
         headings, rows = laws_side_by_side(found, one.name)
         if rows:
             yield "**Laws side by side**"
             yield ""
-            yield from _table(headings, rows)
+            yield table(headings, rows, OF_WORDS)
+            yield ""
     for why, ids in reasons(found).items():
         yield f"- No criterion for {', '.join(ids)}: {why}."
     yield ""
     for title, headings, rows in variant_tables(found):
         yield f"### {title}"
         yield ""
-        yield from _table(headings, rows)
+        yield table(headings, rows, OF_WORDS)
+        yield ""
     for name, why in reasons_of_variants(found).items():
         yield f"- *{name}*: {why}"
     yield ""
@@ -281,12 +285,3 @@ def reasons_of_variants(found: Comparison) -> dict[str, str]:
         for variant in one.variants
         if variant.name in tried
     }
-
-
-def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Lines of a table in Markdown."""
-    yield f"| {' | '.join(headings)} |"
-    yield f"|{'|'.join('---:' if is_number(one) else '---' for one in headings)}|"
-    for row in rows:
-        yield f"| {' | '.join(row)} |"
-    yield ""

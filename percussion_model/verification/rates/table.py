@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Iterator
 
+from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.verification.rates.cases import TOP, Case
 from percussion_model.verification.rates.comparison import RateRow, Rates
@@ -111,7 +112,7 @@ def as_csv(found: Rates) -> str:
 
 def verdicts(found: Rates) -> Iterator[str]:
     """Lines of the table of the criteria, and of numbers beside them."""
-    yield from _table(OF_VERDICTS, verdict_rows(found))
+    yield _table(OF_VERDICTS, verdict_rows(found))
     headings = ("of", *BESIDE)
     rows = [
         [name, *(_number(key, values[key]) for key in BESIDE.values())]
@@ -119,7 +120,7 @@ def verdicts(found: Rates) -> Iterator[str]:
     ]
     yield "Without a criterion:"
     yield ""
-    yield from _table(headings, rows)
+    yield _table(headings, rows)
 
 
 def _number(key: str, value: float) -> str:
@@ -132,7 +133,7 @@ def _number(key: str, value: float) -> str:
 
 def all_cases(found: Rates) -> Iterator[str]:
     """Lines of the table of all cases, with what is assumed and the sources."""
-    yield from _table(HEADINGS, [cells(row) for row in found.rows])
+    yield _table(HEADINGS, [cells(row) for row in found.rows])
     yield from (f"- {one}" for one in NOTES)
     for row in found.rows:
         if row.case.remark:
@@ -148,7 +149,7 @@ def other_rates(found: Rates) -> Iterator[str]:
     """Lines of what is no case, and of what could not be read."""
     headings = ("rate", "kind", "hammer", "bit", "rock", "told", "lacks")
     keys = ("id", "kind", "hammer", "bit", "rock", "rate", "lacks")
-    yield from _table(headings, [[row[key] for key in keys] for row in found.stored.unused])
+    yield _table(headings, [[row[key] for key in keys] for row in found.stored.unused])
     yield "## Wanted"
     yield ""
     for row in found.stored.wanted:
@@ -156,11 +157,8 @@ def other_rates(found: Rates) -> Iterator[str]:
     yield ""
 
 
-def _table(headings: tuple[str, ...], rows: list[list[str]]) -> Iterator[str]:
-    yield f"| {' | '.join(headings)} |"
+def _table(headings: tuple[str, ...], rows: list[list[str]]) -> str:
+    """A table, and the empty line below it."""
     left = (*OF_WORDS, "rate", "kind", "bit", "told", "lacks") if "told" in headings else OF_WORDS
-    yield f"|{'|'.join('---' if one in left else '---:' for one in headings)}|"
-    for row in rows:
-        shown = [f"**{one}**" if one == MISSED else one for one in row]
-        yield f"| {' | '.join(shown)} |"
-    yield ""
+    shown = [[f"**{one}**" if one == MISSED else one for one in row] for row in rows]
+    return table(headings, shown, left) + "\n"
