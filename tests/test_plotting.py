@@ -11,15 +11,12 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from percussion_model.analysis.drill_string import closed_contacts
 from percussion_model.coupling.coupled_run import CoupledRun
 from percussion_model.interface.plotting import CAPTIONS, draw_figures, figures
 from percussion_model.interface.plotting.coupled_signals import PANELS, draw_signals
 from percussion_model.interface.plotting.style import MODE_COLOURS, STYLE, draw_by_mode, save_png
-from percussion_model.interface.plotting.window import (
-    closed_contacts,
-    last_blow_window,
-    stress_fields,
-)
+from percussion_model.interface.plotting.window import last_blow_window, stress_fields
 from percussion_model.physics.records import EVENT, EventKind, Mode
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.files import ResultError

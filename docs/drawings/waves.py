@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from docs.drawings.fronts import fronts
 from docs.drawings.shapes import INK, NOTE, SMALL, blank, lines_of_text
 from percussion_model import Scene, Simulation
+from percussion_model.analysis.drill_string import cells_of, closed_contacts
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.style import KN, MM, MODE_COLOURS, US
-from percussion_model.interface.plotting.window import closed_contacts
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.solvers.modal.records import STEP
 
@@ -76,16 +76,13 @@ def impact_of(scene: Scene) -> Impact:
         rows.append(np.concatenate([fields["piston_force"], fields["bit_force"]]))
     events = simulation.events
     start = float(events["time"][events["kind"] == EventKind.CONTACT_CLOSED][0])
-    heights, areas = [], []
-    for bar in (scene.piston, scene.bit):
-        counts = simulation.solver.section_cells(bar)
-        for section, count in zip(bar.sections, counts, strict=True):
-            heights += [section.length / count] * count
-            areas += [section.area] * count
+    piston, bit = (
+        cells_of(bar, simulation.solver.section_cells(bar)) for bar in (scene.piston, scene.bit)
+    )
     return Impact(
         time=np.arange(len(rows)) * step - start,
-        edges=np.concatenate(([0.0], np.cumsum(heights))),
-        stress=np.array(rows).T / np.array(areas)[:, None],
+        edges=np.append(piston[0], piston[0][-1] + bit[0][1:]),
+        stress=np.array(rows).T / np.append(piston[1], bit[1])[:, None],
         contacts=closed_contacts(events, start, start + SHOWN),
         events=[(float(e["time"]) - start, int(e["kind"])) for e in events],
         start=start,

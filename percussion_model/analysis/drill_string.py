@@ -249,8 +249,6 @@ def string_report(
     )
 
 
-# An event so long before the start of a blow is the one that starts it [s].
-_AT_ONCE = 1e-6
 _ROWS = (Has.CAME, Has.PASSED, Has.RETURNED)
 
 
@@ -337,7 +335,7 @@ def _watched(
             kinetic[name].append(0.5 * float(grid.mass @ (v * v)))
             strain = f / impedance[name]
             elastic[name].append(0.5 * float(grid.mass @ (strain * strain)))
-    shapes = {name: _cells(bars[name], grid.in_sections) for name, grid in grids.items()}
+    shapes = {name: cells_of(bars[name], grid.in_sections) for name, grid in grids.items()}
     return WatchedBlow(
         time=(first + np.arange(count)) * step - start,
         start=start,
@@ -346,28 +344,40 @@ def _watched(
         area={name: area for name, (_, area) in shapes.items()},
         kinetic={name: np.array(rows) for name, rows in kinetic.items()},
         elastic={name: np.array(rows) for name, rows in elastic.items()},
-        contacts=_contacts(simulation.events, start, start + count * step),
+        contacts=closed_contacts(simulation.events, start, start + count * step),
     )
 
 
-def _cells(bar: Bar, counts: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Edges of the cells of a bar from its top [m], and their areas [m2]."""
+def cells_of(bar: Bar, counts: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of the cells of a bar from its top [m], and their areas [m2]; so many a section."""
     heights = [s.length / n for s, n in zip(bar.sections, counts, strict=True) for _ in range(n)]
     areas = [s.area for s, n in zip(bar.sections, counts, strict=True) for _ in range(n)]
     return np.concatenate(([0.0], np.cumsum(heights))), np.array(areas)
 
 
-def _contacts(events: np.ndarray, start: float, end: float) -> list[tuple[float, float]]:
+def closed_contacts(events: np.ndarray, start: float, end: float) -> list[tuple[float, float]]:
     """Intervals in which the piston is on the struck bar, counted from `start` [s]."""
-    found: list[tuple[float, float]] = []
-    since = None
-    for event in events[events["time"] >= start - _AT_ONCE]:
-        if event["kind"] == EventKind.CONTACT_CLOSED and since is None:
-            since = float(event["time"]) - start
-        elif event["kind"] == EventKind.CONTACT_OPENED and since is not None:
-            found.append((since, float(event["time"]) - start))
-            since = None
-    return found if since is None else [*found, (since, end - start)]
+    contacts: list[tuple[float, float]] = []
+    closed_at: float | None = None
+    for event in events[np.isin(events["kind"], _CONTACT_KINDS)]:
+        time = float(event["time"])
+        if event["kind"] == EventKind.CONTACT_CLOSED:
+            closed_at = time if closed_at is None else closed_at
+        elif closed_at is not None:
+            contacts.append((closed_at, time))
+            closed_at = None
+    if closed_at is not None:
+        contacts.append((closed_at, end))
+    return [
+        (max(a, start) - start, min(b, end) - start)
+        for a, b in contacts
+        if b >= start - _SAME_TIME and a < end - _SAME_TIME
+    ]
+
+
+_CONTACT_KINDS = (EventKind.CONTACT_CLOSED, EventKind.CONTACT_OPENED)
+# The end of a blow is the start of the next, up to rounding [s].
+_SAME_TIME = 1e-9
 
 
 def bar_stress(stress: np.ndarray, edges: np.ndarray, time: np.ndarray) -> BarStress:

@@ -12,9 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from percussion_model.analysis.drill_string import BarStress, bar_stress
+from percussion_model.analysis.drill_string import (
+    BarStress,
+    bar_stress,
+    cells_of,
+    closed_contacts,
+)
 from percussion_model.physics.records import EventKind, Mode
-from percussion_model.scene.bar_groups import Bar
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, Snapshot
@@ -252,31 +256,6 @@ def _worth_sampling(times: np.ndarray, start: float, busy: float, events: np.nda
     return chosen
 
 
-def closed_contacts(events: np.ndarray, start: float, end: float) -> list[tuple[float, float]]:
-    """Intervals in which the piston/bit gap is closed, counted from `start` [s]."""
-    contacts: list[tuple[float, float]] = []
-    closed_at: float | None = None
-    for event in events[np.isin(events["kind"], _CONTACT_KINDS)]:
-        time = float(event["time"])
-        if event["kind"] == EventKind.CONTACT_CLOSED:
-            closed_at = time if closed_at is None else closed_at
-        elif closed_at is not None:
-            contacts.append((closed_at, time))
-            closed_at = None
-    if closed_at is not None:
-        contacts.append((closed_at, end))
-    return [
-        (max(a, start) - start, min(b, end) - start)
-        for a, b in contacts
-        if b >= start - _SAME_TIME and a < end - _SAME_TIME
-    ]
-
-
-_CONTACT_KINDS = (EventKind.CONTACT_CLOSED, EventKind.CONTACT_OPENED)
-# The end of a blow is the start of the next, up to rounding [s].
-_SAME_TIME = 1e-9
-
-
 def stress_fields(window: Window, every: int = 1) -> dict[str, StressField]:
     """Stress in the elastic bars during the window's first waves.
 
@@ -313,21 +292,8 @@ def stress_fields(window: Window, every: int = 1) -> dict[str, StressField]:
         for name, rows in forces.items():
             rows.append(fields[f"{name}_force"])
     edges = (first + np.arange(count + 1) - 0.5) * step - window.origin
+    shapes = {name: cells_of(b, simulation.solver.section_cells(b)) for name, b in bars.items()}
     return {
-        name: _stress(bar, edges, np.array(forces[name]).T, simulation.solver.section_cells(bar))
-        for name, bar in bars.items()
+        name: StressField(edges, depths, np.array(forces[name]).T / areas[:, None])
+        for name, (depths, areas) in shapes.items()
     }
-
-
-def _stress(bar: Bar, time_edges: np.ndarray, force: np.ndarray, counts: list[int]) -> StressField:
-    """Divide the force in each cell by its area; `counts` are the cells of each section."""
-    heights: list[float] = []
-    areas: list[float] = []
-    for section, cells in zip(bar.sections, counts, strict=True):
-        heights += [section.length / cells] * cells
-        areas += [section.area] * cells
-    return StressField(
-        time_edges=time_edges,
-        depth_edges=np.concatenate(([0.0], np.cumsum(heights))),
-        stress=force / np.array(areas)[:, None],
-    )
