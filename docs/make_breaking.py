@@ -7,24 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
 from percussion_model.scene.bits import bit, bit_of
 from percussion_model.scene.hammers import hammer, hammers
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import parameters_under
-from percussion_model.scene.text import write_text
 from percussion_model.simulation.markdown import table
 
-HERE = Path(__file__).resolve().parent
 ROCKS = ("kuru-granite", "st-anne-limestone", "sierra-white-granite")
 # Feed that a maker of hammers of 3 to 6 inch recommends [N] (docs/data/hammer_sources.md).
 FEEDS = {
@@ -169,10 +166,8 @@ def main() -> None:
     left, right = figure.subplots(1, 2)
     draw_rotation(left, over_rotation(scene))
     draw_feed(right, {motor: over_feed(scene, motor) for motor in MOTORS})
-    style.save_png(figure, HERE / "images" / "breaking.png", 110)
-    page = HERE / "breaking.md"
-    blocks = {"presets": lambda: table(HEADINGS, preset_rows())}
-    write_text(page, renewed(page, blocks))
+    style.save_png(figure, DOCS / "images" / "breaking.png", 110)
+    publish({"presets": lambda: table(HEADINGS, preset_rows())}, DOCS / "breaking.md")
 
 
 if __name__ == "__main__":

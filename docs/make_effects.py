@@ -5,20 +5,15 @@ Takes a minute; an idle machine gives the better figures.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model import Scene
 from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting.effect_bars import draw_effects
-from percussion_model.interface.plotting.style import save_figures
 from percussion_model.simulation.markdown import table
 from percussion_model.verification.accuracy.timing import machine
 
-HERE = Path(__file__).resolve().parent
-PAGE = HERE / "effects.md"
-REFERENCE = HERE.parent / "scenarios" / "reference.toml"
+REFERENCE = DOCS.parent / "scenarios" / "reference.toml"
 
 
 def block(found: EffectsStudy, computer: dict[str, object]) -> str:
@@ -40,9 +35,10 @@ def main() -> None:
     """Measure, write the page and draw the figure."""
     computer = machine()
     found = study_effects(Scene.from_toml(REFERENCE))
-    text = renewed(PAGE, {"effects": block(found, computer)})
-    PAGE.write_text(text, encoding="utf-8")
-    save_figures(lambda: [("effects", draw_effects(found))], HERE / "images", ("png",), dpi=110)
+    publish(
+        {"effects": block(found, computer)}, DOCS / "effects.md", dpi=110,
+        figures=lambda: [("effects", draw_effects(found))],
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from pathlib import Path
 
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model import Scene, Simulation, simulate
 from percussion_model.simulation.markdown import table
-
-PAGE = Path(__file__).with_name("fidelity.md")
 
 SCENES: dict[str, dict[str, float]] = {
     "reference": {},
@@ -67,4 +64,4 @@ def costs() -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(renewed(PAGE, {"errors": errors, "costs": costs}), encoding="utf-8")
+    publish({"errors": errors, "costs": costs}, DOCS / "fidelity.md")

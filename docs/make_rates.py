@@ -5,17 +5,13 @@ Takes half a minute.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model.interface.plotting.rates import draw_rates
-from percussion_model.interface.plotting.style import save_figures
 from percussion_model.interface.progress import count_bar
 from percussion_model.verification.rates import Rates, compare_rates
 from percussion_model.verification.rates.table import all_cases, other_rates, verdicts
 
-HERE = Path(__file__).resolve().parent
-PAGE = HERE / "data" / "rates.md"
+PAGE = DOCS / "data" / "rates.md"
 DPI = 90
 
 
@@ -29,10 +25,7 @@ def main() -> None:
     """Compute, write the page and draw the figure."""
     with count_bar("rates") as progress:
         found = compare_rates(progress=progress)
-    PAGE.write_text(renewed(PAGE, blocks(found)), encoding="utf-8")
-    save_figures(
-        lambda: iter([("rates", draw_rates(found))]), HERE / "images", kinds=("png",), dpi=DPI
-    )
+    publish(blocks(found), PAGE, figures=lambda: [("rates", draw_rates(found))], dpi=DPI)
 
 
 if __name__ == "__main__":

@@ -10,15 +10,13 @@ import json
 import sys
 from pathlib import Path
 
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model.interface.plotting.stability_dots import draw_stability
-from percussion_model.interface.plotting.style import save_figures
 from percussion_model.interface.progress import count_bar
 from percussion_model.verification.hard_cases import Collection, run_collection
 from percussion_model.verification.hard_cases.stability_page import page, verdict
 
-HERE = Path(__file__).resolve().parent
-GUIDE, DATA = HERE / "stability.md", HERE / "data" / "hard_cases.md"
+GUIDE, DATA = DOCS / "stability.md", DOCS / "data" / "hard_cases.md"
 
 
 def collection(file: str | None) -> Collection:
@@ -33,10 +31,10 @@ def collection(file: str | None) -> Collection:
 def main(file: str | None = None) -> None:
     """Write both pages and draw the figure."""
     found = collection(file)
-    save_figures(lambda: [("stability", draw_stability(found))], HERE / "images", kinds=("png",))
     text = page(found, "../images/stability.png", "the [guide to hard cases](../stability.md)")
     DATA.write_text(text, encoding="utf-8")
-    GUIDE.write_text(renewed(GUIDE, {"verdict": verdict(found).rstrip()}), encoding="utf-8")
+    blocks = {"verdict": verdict(found).rstrip()}
+    publish(blocks, GUIDE, figures=lambda: [("stability", draw_stability(found))])
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from docs.blocks import renewed
+from docs.blocks import publish
 from docs.drawings.system import SYSTEM, connected
 from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import read_plan
@@ -66,4 +66,4 @@ def _cells(one: Variable) -> tuple[str, ...]:
 if __name__ == "__main__":
     VARIABLES.parent.mkdir(exist_ok=True)
     VARIABLES.write_text(variables_page(), encoding="utf-8")
-    PAGE.write_text(renewed(PAGE, {"signals": signals}), encoding="utf-8")
+    publish({"signals": signals}, PAGE)

@@ -8,19 +8,16 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
-from percussion_model.scene.text import write_text
 from percussion_model.simulation.markdown import table
 from percussion_model.simulation.warnings import least_loss_time
 
-HERE = Path(__file__).resolve().parent
 CELLS = (20, 40, 80)
 COLOURS = ("#56B4E9", "#0072B2", "#222222")
 # Loss times [s]; between the limits the motion is aperiodic and needs many blows; below,
@@ -142,9 +139,10 @@ def main() -> None:
         print({name: row[name] for name in ("loss", "cells", "rate", "error")}, file=sys.stderr)
         # what has not settled within the duration has no rate
         rows.append({name: math.nan if value is None else value for name, value in row.items()})
-    style.save_figures(lambda: [("undamped", draw(rows))], HERE / "images", ("png",), dpi=110)
-    page = HERE / "data" / "undamped.md"
-    write_text(page, renewed(page, {"rates": block(rows)}))
+    publish(
+        {"rates": block(rows)}, DOCS / "data" / "undamped.md", dpi=110,
+        figures=lambda: [("undamped", draw(rows))],
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -5,17 +5,13 @@ Takes some seconds.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from docs.blocks import renewed
-from percussion_model.interface.plotting.style import save_figures
+from docs.blocks import DOCS, publish
 from percussion_model.interface.plotting.validation import draw_all
 from percussion_model.interface.progress import count_bar
 from percussion_model.verification.measured import Comparison, compare, load, wanted
 from percussion_model.verification.measured.table import NOTES, markdown
 
-HERE = Path(__file__).resolve().parent
-PAGE = HERE / "validation.md"
+PAGE = DOCS / "validation.md"
 DPI = 90
 
 
@@ -30,13 +26,10 @@ def main() -> None:
     """Compute, write the page and draw the figures."""
     with count_bar("fits") as progress:
         found = compare(load(), progress=progress)
-    PAGE.write_text(renewed(PAGE, {"tables": block(found)}), encoding="utf-8")
-    save_figures(
-        lambda: ((f"validation_{name}", figure) for name, figure in draw_all(found)),
-        HERE / "images",
-        kinds=("png",),
-        dpi=DPI,
-    )
+    publish(
+        {"tables": block(found)}, PAGE, dpi=DPI,
+        figures=lambda: ((f"validation_{name}", figure) for name, figure in draw_all(found)),
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

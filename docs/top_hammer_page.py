@@ -7,20 +7,14 @@ Runs every hammer with some numbers of rods, and reports on one string; takes a 
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from docs.blocks import renewed
+from docs.blocks import DOCS, publish
 from percussion_model import Result, simulate
 from percussion_model.analysis.drill_string import StringReport, string_report
 from percussion_model.interface.plotting.drill_string import bar_title, draw_string
-from percussion_model.interface.plotting.style import save_figures
 from percussion_model.scene.hammers import hammer, hammers
-from percussion_model.scene.text import write_text
 from percussion_model.simulation.markdown import table
 
-HERE = Path(__file__).resolve().parent
-PAGE = HERE / "top_hammer.md"
-DATA = HERE / "data" / "top_hammer.md"
+PAGES = DOCS / "top_hammer.md", DOCS / "data" / "top_hammer.md"
 DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)
@@ -151,12 +145,6 @@ def at_the_rock(report: StringReport) -> str:
 def main() -> None:
     """Make the figures and the tables."""
     report = string_report(hammer(SHOWN, SHOWN_RODS), DURATION, SETTLE, GAUGES)
-    save_figures(
-        lambda: (
-            (name.replace("string", "top_hammer"), fig) for name, fig in draw_string(report)
-        ),
-        HERE / "images", ("png",), dpi=DPI,
-    )  # fmt: skip
     contents = {
         "rock": at_the_rock(report),
         "joints": joints(report),
@@ -165,8 +153,12 @@ def main() -> None:
         "presets": presets(),
         "stresses": stresses(report),
     }
-    for path in (PAGE, DATA):
-        write_text(path, renewed(path, contents))
+    publish(
+        contents, *PAGES, dpi=DPI,
+        figures=lambda: (
+            (name.replace("string", "top_hammer"), fig) for name, fig in draw_string(report)
+        ),
+    )  # fmt: skip
 
 
 if __name__ == "__main__":
