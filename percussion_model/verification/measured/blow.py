@@ -147,7 +147,7 @@ def _slope(time: np.ndarray, path: np.ndarray, part: slice) -> float:
 
 
 def _residual(blow: Blow) -> float:
-    """Penetration where the line of the last two forces of contact has come to nothing.
+    """Penetration [m] where the line of the last two forces of contact has come to nothing.
 
     Forces are means of time steps, so the middles of these are their places.
     """
@@ -163,6 +163,7 @@ def _residual(blow: Blow) -> float:
 
 
 def _loading_stiffness(blow: Blow) -> float:
+    """Slope of force over penetration from 10 to 90 % of the peak force while it rises [N/m]."""
     most = int(np.argmax(blow.force))
     share = blow.force[: most + 1] / blow.force[most]
     part = (share >= SLOPE_FROM) & (share <= SLOPE_TO)
@@ -172,6 +173,7 @@ def _loading_stiffness(blow: Blow) -> float:
 
 
 def _secant(blow: Blow) -> float:
+    """Peak force divided by the penetration then [N/m]."""
     most = int(np.argmax(blow.force))
     return float(blow.force[most] / blow.end[most])
 
