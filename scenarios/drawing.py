@@ -41,10 +41,6 @@ def stacked(
         "quantity [unit]" of each panel.
     size : tuple of float
         Of the figure [inch].
-
-    Returns
-    -------
-    Figure, list of Axes
     """
     from matplotlib.figure import Figure
 

@@ -167,10 +167,6 @@ def string_report(
     gauges : sequence of (str, float)
         Bar and distance from its top [m].
 
-    Returns
-    -------
-    StringReport
-
     Raises
     ------
     SceneError

@@ -69,16 +69,11 @@ def _until(report: StringReport) -> int:
     return int(np.searchsorted(report.watched.time, shown, side="right"))
 
 
-# ------------------------------------------------------------------ force by place and time
+# force by place and time
 
 
 def draw_waves(report: StringReport) -> Figure:
-    """Draw the force in the whole string over time and place, with the forces at its ends.
-
-    Parameters
-    ----------
-    report : StringReport
-    """
+    """Draw the force in the whole string over time and place, with the forces at its ends."""
     watched, count = report.watched, _until(report)
     time = watched.time[:count]
     step = float(time[1] - time[0])
@@ -161,16 +156,11 @@ def _end_forces(ax: Axes, watched: WatchedBlow, count: int) -> None:
     style.label(ax, "time since the impact [ms]", "force [kN]")
 
 
-# ------------------------------------------------------------------------ energy and peaks
+# energy and peaks
 
 
 def draw_energy(report: StringReport) -> Figure:
-    """Draw the energy of each bar over time, and the greatest forces along the string.
-
-    Parameters
-    ----------
-    report : StringReport
-    """
+    """Draw the energy of each bar over time, and the greatest forces along the string."""
     watched, count = report.watched, _until(report)
     fig = Figure(figsize=(10.0, 7.4), layout="constrained")
     above, below = fig.subplots(2, 1, height_ratios=(1.25, 1.0))
@@ -254,17 +244,11 @@ def _peaks(ax: Axes, watched: WatchedBlow) -> None:
     )  # fmt: skip
 
 
-# ---------------------------------------------------------------------------------- gauges
+# gauges
 
 
 def draw_gauges(report: StringReport) -> Figure:
-    """Draw the stress at each gauge over time, one below the other.
-
-    Parameters
-    ----------
-    report : StringReport
-        With gauges.
-    """
+    """Draw the stress at each gauge of a report over time, one below the other."""
     watched, count = report.watched, _until(report)
     time, step = watched.time[:count], float(watched.time[1] - watched.time[0])
     offsets = _offsets(watched)

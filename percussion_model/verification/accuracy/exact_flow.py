@@ -45,8 +45,6 @@ class ExactFlowSolver(PeerSolver):
         With elastic bars; its inputs stay as they are.
     elements : int
         In the piston, or in the bit without one; the bit's have about the same length.
-    watch : int
-        Steps in the bit's transit time in which events are looked for.
     """
 
     name, title = "exact-flow", "exact flow"
@@ -55,14 +53,14 @@ class ExactFlowSolver(PeerSolver):
     levels = LEVELS
     COUNTS: ClassVar[tuple[str, ...]] = ("steps", "events", "blows")
 
-    def __init__(self, scene: Scene, elements: int, watch: int = WATCH) -> None:
+    def __init__(self, scene: Scene, elements: int) -> None:
         refuse_uncarried(self.title, scene, CARRIED)
         super().__init__(scene)
         self._numbers = numbers = numbers_of(scene)
         par = np.zeros(1, FLOW_PAR)
         p: Any = par[0]
         fill_parameters(p, numbers, True)
-        p["step"] = self.time_step = scene.bit.transit_time / watch
+        p["step"] = self.time_step = scene.bit.transit_time / WATCH
         first = scene.bit if scene.piston.model == "absent" else scene.piston
         bars = [cut_bar(numbers.bit, first.length / elements)]
         if scene.piston.model != "absent":

@@ -45,10 +45,6 @@ def interleaved(
         Each makes one run and returns its time [s].
     turn : callable, optional
         Called with the share that is done, before each run.
-
-    Returns
-    -------
-    list of Timing
     """
     found: list[list[float]] = [[] for _ in costs]
     for repeat in range(REPEATS):

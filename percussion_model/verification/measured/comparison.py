@@ -237,10 +237,6 @@ def compare(
         Whether variants of the rigs are computed as well.
     progress : callable, optional
         Is told how many fits are done, and of how many.
-
-    Returns
-    -------
-    Comparison
     """
     plans = [(one, plan) for one in experiments for plan in one.fits]
     others = [
