@@ -25,24 +25,12 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True)
 class Archive:
-    """A file that a scenario runs.
+    """A file that a scenario runs."""
 
-    Attributes
-    ----------
-    metavar : str
-        What it is called in the help.
-    default : Path
-        The one that is taken where none is named.
-    entry : str
-        File that every archive of the kind has in it.
-    make : callable, optional
-        Makes the default one where it is not there.
-    """
-
-    metavar: str
-    default: Path
-    entry: str
-    make: Callable[[], object] | None = None
+    metavar: str  # what it is called in the help
+    default: Path  # taken where none is named
+    entry: str  # file that every archive of the kind has in it
+    make: Callable[[], object] | None = None  # makes the default one where it is not there
 
     def found(self, named: Path | None) -> Path:
         """The archive that is named, or else the default one; refused where it is none."""
