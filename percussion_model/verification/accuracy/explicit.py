@@ -6,10 +6,11 @@ A peer that methods are compared with, compiled and tuned as its best user would
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
+from percussion_model.engine.solver import Grid
 from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import (
     AREA,
@@ -71,17 +72,6 @@ def stable_step(transit_time: float, loss_time: float) -> float:
     """
     zeta = loss_time / transit_time
     return transit_time * (math.sqrt(1.0 + zeta * zeta) - zeta)
-
-
-class Elements(NamedTuple):
-    """Elements of one bar, top to bottom."""
-
-    mass: np.ndarray  # shape (n,), of each [kg]
-
-    @property
-    def n(self) -> int:
-        """Number of elements."""
-        return len(self.mass)
 
 
 class ExplicitSolver(PeerSolver):
@@ -237,12 +227,12 @@ class ExplicitSolver(PeerSolver):
         """Stretches of a bar."""
         return self._runs[self._runs["bar"] == self._bars.index(bar)]
 
-    def grid_of(self, bar: str) -> Elements | None:
+    def grid_of(self, bar: str) -> Grid | None:
         """Elements of a bar, None where it has none."""
         if bar not in self._bars:
             return None
         runs = self._runs_of(bar)
-        return Elements(np.repeat(2.0 * runs["half"], runs["n"]))
+        return Grid(np.repeat(2.0 * runs["half"], runs["n"]), runs["n"].tolist())
 
     def fields(self, state: State) -> dict[str, np.ndarray]:
         """Elastic force [N] and velocity [m/s] of each element, top to bottom, by bar."""

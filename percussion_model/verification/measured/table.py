@@ -129,7 +129,7 @@ def parameters_text(found: FoundFit) -> str:
         name, unit, scale = SYMBOLS.get(key, plain)
         unit = f" {unit}" if unit else ""
         if key in found.fitted:
-            shape = Quantity("", "", "", scale, "")
+            shape = Quantity("", "", "", scale)
             parts.append(f"{name} {shown(shape, value, found.errors[key])}{unit}")
         else:
             parts.append(f"{name} {in_digits(value / scale, 4)}{unit} (kept)")
