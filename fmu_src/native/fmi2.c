@@ -3,16 +3,11 @@
 
 #include "fmi2Functions.h"
 
-#include <math.h>
-#include <string.h>
-
-static const Access REALS = {REAL, DOUBLES, "Real"};
-static const Access INTEGERS = {INTEGER | ENUMERATION, INTS, "Integer"};
-static const Access BOOLEANS = {BOOLEAN, INTS, "Boolean"};
-static const Access STRINGS = {0, NO_FORM, "String"}; /* there are none */
-
 /* A status of the core is one of FMI. */
 static fmi2Status as2(Status status) { return (fmi2Status)status; }
+
+/* What the core says, where there is an instance. */
+#define CORE(call) (c == NULL ? fmi2Error : as2(call))
 
 /* A host takes the text for a printf format. Some print it as it is, so it is no argument. */
 static void send(Instance *one, Status status, const char *category, const char *text) {
@@ -33,7 +28,7 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-    return c == NULL ? fmi2Error : as2(choose_logging(c, loggingOn, nCategories, categories));
+    return CORE(choose_logging(c, loggingOn, nCategories, categories));
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
@@ -105,91 +100,56 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    return c == NULL ? fmi2Error : as2(terminate(c, "fmi2Terminate"));
+    return CORE(terminate(c, "fmi2Terminate"));
 }
 
-fmi2Status fmi2Reset(fmi2Component c) { return c == NULL ? fmi2Error : as2(reset(c)); }
+fmi2Status fmi2Reset(fmi2Component c) { return CORE(reset(c)); }
 
 /* ---- variables -------------------------------------------------------------------- */
 
-static fmi2Status get2(Instance *one, const Access *access, const fmi2ValueReference vr[],
-                       size_t nvr, void *value) {
-    return one == NULL ? fmi2Error : as2(get_values(one, access, vr, nvr, value, nvr));
-}
+/* Getter and setter of a type; variables of type 0 there are none. */
+#define ACCESS(Word, types, form)                                                              \
+    static const Access OF_##Word = {types, form, #Word};                                      \
+    fmi2Status fmi2Get##Word(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,       \
+                             fmi2##Word value[]) {                                             \
+        return CORE(get_values(c, &OF_##Word, vr, nvr, (void *)value, nvr));                   \
+    }                                                                                          \
+    fmi2Status fmi2Set##Word(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,       \
+                             const fmi2##Word value[]) {                                       \
+        return CORE(set_values(c, &OF_##Word, vr, nvr, (const void *)value, nvr));             \
+    }
 
-static fmi2Status set2(Instance *one, const Access *access, const fmi2ValueReference vr[],
-                       size_t nvr, const void *value) {
-    return one == NULL ? fmi2Error : as2(set_values(one, access, vr, nvr, value, nvr));
-}
-
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                       fmi2Real value[]) {
-    return get2(c, &REALS, vr, nvr, value);
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Integer value[]) {
-    return get2(c, &INTEGERS, vr, nvr, value);
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Boolean value[]) {
-    return get2(c, &BOOLEANS, vr, nvr, value);
-}
-
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                         fmi2String value[]) {
-    return get2(c, &STRINGS, vr, nvr, (void *)value);
-}
-
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                       const fmi2Real value[]) {
-    return set2(c, &REALS, vr, nvr, value);
-}
-
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Integer value[]) {
-    return set2(c, &INTEGERS, vr, nvr, value);
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Boolean value[]) {
-    return set2(c, &BOOLEANS, vr, nvr, value);
-}
-
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                         const fmi2String value[]) {
-    return set2(c, &STRINGS, vr, nvr, (const void *)value);
-}
+ACCESS(Real, REAL, DOUBLES)
+ACCESS(Integer, INTEGER | ENUMERATION, INTS)
+ACCESS(Boolean, BOOLEAN, INTS)
+ACCESS(String, 0, NO_FORM)
 
 /* ---- states ----------------------------------------------------------------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return c == NULL ? fmi2Error : as2(get_state(c, FMUstate));
+    return CORE(get_state(c, FMUstate));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-    return c == NULL ? fmi2Error : as2(set_state(c, FMUstate));
+    return CORE(set_state(c, FMUstate));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return c == NULL ? fmi2Error : as2(free_state(c, FMUstate));
+    return CORE(free_state(c, FMUstate));
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
-    return c == NULL ? fmi2Error : as2(state_size(c, FMUstate, size));
+    return CORE(state_size(c, FMUstate, size));
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate,
                                  fmi2Byte serializedState[], size_t size) {
-    return c == NULL ? fmi2Error
-                     : as2(state_to_bytes(c, FMUstate, (uint8_t *)serializedState, size));
+    return CORE(state_to_bytes(c, FMUstate, (uint8_t *)serializedState, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
-    return c == NULL ? fmi2Error
-                     : as2(state_from_bytes(c, (const uint8_t *)serializedState, size, FMUstate));
+    return CORE(state_from_bytes(c, (const uint8_t *)serializedState, size, FMUstate));
 }
 
 /* ---- steps ------------------------------------------------------------------------ */
@@ -198,13 +158,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     (void)noSetFMUStatePriorToCurrentPoint;
-    return c == NULL ? fmi2Error
-                     : as2(do_step(c, "fmi2DoStep", currentCommunicationPoint,
-                                   communicationStepSize));
+    return CORE(do_step(c, "fmi2DoStep", currentCommunicationPoint, communicationStepSize));
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
-    return c == NULL ? fmi2Error : as2(refuse(c, "fmi2CancelStep: a step ends before its call does"));
+    return CORE(refuse(c, "fmi2CancelStep: a step ends before its call does"));
 }
 
 /* Steps are never pending: there is little to ask for. */
@@ -249,26 +207,21 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
 
 /* ---- what this FMU does not have -------------------------------------------------- */
 
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return c == NULL ? fmi2Error
-                     : as2(refuse(c, "fmi2SetRealInputDerivatives: inputs are not interpolated"));
+    return CORE(refuse(c, "fmi2SetRealInputDerivatives: inputs are not interpolated"));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[],
                                         size_t nvr, const fmi2Integer order[], fmi2Real value[]) {
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return c == NULL ? fmi2Error
-                     : as2(refuse(c, "fmi2GetRealOutputDerivatives: outputs have none"));
+    return CORE(refuse(c, "fmi2GetRealOutputDerivatives: outputs have none"));
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
                                         size_t nUnknown, const fmi2ValueReference vKnown_ref[],
                                         size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown;
-    (void)dvKnown, (void)dvUnknown;
-    return c == NULL ? fmi2Error
-                     : as2(refuse(c, "fmi2GetDirectionalDerivative: there are none"));
+    return CORE(refuse(c, "fmi2GetDirectionalDerivative: there are none"));
 }

@@ -5,6 +5,9 @@
 
 fmi3Status as3(Status status) { return (fmi3Status)status; }
 
+/* What the core says, where there is an instance. */
+#define CORE(call) (instance == NULL ? fmi3Error : as3(call))
+
 static void send(Instance *one, Status status, const char *category, const char *text) {
     ((fmi3LogMessageCallback)one->logger)(one->host, as3(status), category, text);
 }
@@ -13,8 +16,7 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-    return instance == NULL ? fmi3Error
-                            : as3(choose_logging(instance, loggingOn, nCategories, categories));
+    return CORE(choose_logging(instance, loggingOn, nCategories, categories));
 }
 
 /* ---- making and freeing ----------------------------------------------------------- */
@@ -198,11 +200,11 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {
-    return instance == NULL ? fmi3Error : as3(terminate(instance, "fmi3Terminate"));
+    return CORE(terminate(instance, "fmi3Terminate"));
 }
 
 fmi3Status fmi3Reset(fmi3Instance instance) {
-    return instance == NULL ? fmi3Error : as3(reset(instance));
+    return CORE(reset(instance));
 }
 
 /* ---- steps ------------------------------------------------------------------------ */
@@ -307,31 +309,29 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 /* ---- states ----------------------------------------------------------------------- */
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return instance == NULL ? fmi3Error : as3(get_state(instance, FMUState));
+    return CORE(get_state(instance, FMUState));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-    return instance == NULL ? fmi3Error : as3(set_state(instance, FMUState));
+    return CORE(set_state(instance, FMUState));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return instance == NULL ? fmi3Error : as3(free_state(instance, FMUState));
+    return CORE(free_state(instance, FMUState));
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
-    return instance == NULL ? fmi3Error : as3(state_size(instance, FMUState, size));
+    return CORE(state_size(instance, FMUState, size));
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
                                  fmi3Byte serializedState[], size_t size) {
-    return instance == NULL ? fmi3Error
-                            : as3(state_to_bytes(instance, FMUState, serializedState, size));
+    return CORE(state_to_bytes(instance, FMUState, serializedState, size));
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
                                    size_t size, fmi3FMUState *FMUState) {
-    return instance == NULL ? fmi3Error
-                            : as3(state_from_bytes(instance, serializedState, size, FMUState));
+    return CORE(state_from_bytes(instance, serializedState, size, FMUState));
 }
 
 /* ---- dependencies ----------------------------------------------------------------- */

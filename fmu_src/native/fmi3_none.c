@@ -1,6 +1,9 @@
 /* FMI 3.0: what this FMU does not have, each with a message. */
 #include "fmi3.h"
 
+/* None of them looks at its arguments. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 static fmi3Status none(Instance *one, const char *call, const char *why) {
     return one == NULL ? fmi3Error : as3(refuse(one, "%s: %s", call, why));
 }
@@ -19,8 +22,6 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance,
                                         const fmi3ValueReference knowns[], size_t nKnowns,
                                         const fmi3Float64 seed[], size_t nSeed,
                                         fmi3Float64 sensitivity[], size_t nSensitivity) {
-    (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns;
-    (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity;
     NONE(NO_DERIVATIVES);
 }
 
@@ -28,8 +29,6 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nUnknowns, const fmi3ValueReference knowns[],
                                     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                     fmi3Float64 sensitivity[], size_t nSensitivity) {
-    (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns;
-    (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity;
     NONE(NO_DERIVATIVES);
 }
 
@@ -37,7 +36,6 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
                                     const fmi3ValueReference valueReferences[],
                                     size_t nValueReferences, const fmi3Int32 orders[],
                                     fmi3Float64 values[], size_t nValues) {
-    (void)valueReferences, (void)nValueReferences, (void)orders, (void)values, (void)nValues;
     NONE(NO_DERIVATIVES);
 }
 
@@ -53,7 +51,6 @@ fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance,
                                   const fmi3ValueReference valueReferences[],
                                   size_t nValueReferences, fmi3Float64 intervals[],
                                   fmi3IntervalQualifier qualifiers[]) {
-    (void)valueReferences, (void)nValueReferences, (void)intervals, (void)qualifiers;
     NONE(NO_CLOCKS);
 }
 
@@ -61,28 +58,23 @@ fmi3Status fmi3GetIntervalFraction(fmi3Instance instance,
                                    const fmi3ValueReference valueReferences[],
                                    size_t nValueReferences, fmi3UInt64 counters[],
                                    fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    (void)qualifiers;
     NONE(NO_CLOCKS);
 }
 
 fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                size_t nValueReferences, fmi3Float64 shifts[]) {
-    (void)valueReferences, (void)nValueReferences, (void)shifts;
     NONE(NO_CLOCKS);
 }
 
 fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                 size_t nValueReferences, fmi3UInt64 counters[],
                                 fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
     NONE(NO_CLOCKS);
 }
 
 fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance,
                                   const fmi3ValueReference valueReferences[],
                                   size_t nValueReferences, const fmi3Float64 intervals[]) {
-    (void)valueReferences, (void)nValueReferences, (void)intervals;
     NONE(NO_CLOCKS);
 }
 
@@ -90,26 +82,22 @@ fmi3Status fmi3SetIntervalFraction(fmi3Instance instance,
                                    const fmi3ValueReference valueReferences[],
                                    size_t nValueReferences, const fmi3UInt64 counters[],
                                    const fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
     NONE(NO_CLOCKS);
 }
 
 fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                size_t nValueReferences, const fmi3Float64 shifts[]) {
-    (void)valueReferences, (void)nValueReferences, (void)shifts;
     NONE(NO_CLOCKS);
 }
 
 fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                 size_t nValueReferences, const fmi3UInt64 counters[],
                                 const fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
     NONE(NO_CLOCKS);
 }
 
 fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
                                       fmi3Float64 activationTime) {
-    (void)clockReference, (void)activationTime;
     NONE(NO_CLOCKS);
 }
 
@@ -121,51 +109,40 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
     NONE(NO_EXCHANGE);
 }
 
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
-    (void)time;
-    NONE(NO_EXCHANGE);
-}
+fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) { NONE(NO_EXCHANGE); }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
                                    size_t nContinuousStates) {
-    (void)continuousStates, (void)nContinuousStates;
     NONE(NO_EXCHANGE);
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
                                              size_t nContinuousStates) {
-    (void)derivatives, (void)nContinuousStates;
     NONE(NO_EXCHANGE);
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
                                   size_t nEventIndicators) {
-    (void)eventIndicators, (void)nEventIndicators;
     NONE(NO_EXCHANGE);
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
                                    size_t nContinuousStates) {
-    (void)continuousStates, (void)nContinuousStates;
     NONE(NO_EXCHANGE);
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
                                              size_t nContinuousStates) {
-    (void)nominals, (void)nContinuousStates;
     NONE(NO_EXCHANGE);
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    (void)nEventIndicators;
     NONE(NO_EXCHANGE);
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    (void)nContinuousStates;
     NONE(NO_EXCHANGE);
 }
