@@ -1,28 +1,27 @@
-"""modelDescription.xml: what pythonfmu writes, and all that it leaves out."""
+"""modelDescription.xml of FMI 2.0, for FMUs that run Python and for those that need none."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any, ClassVar
+from typing import Any, NamedTuple
 from uuid import UUID
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
-
-from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Integer, Real
-from pythonfmu.enums import Fmi2Initial, Fmi2Variability
 
 from fmu_src.flat_names import flatten
 from fmu_src.units import write_units
 from fmu_src.variables import Variable
 
-OPTIONS = {
-    "needsExecutionTool": "true",  # a Python
+CAPABILITIES = {
     "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
 }
+_INITIAL = {"parameter": "exact", "output": "calculated"}
 
 
 @dataclass(frozen=True)
@@ -39,76 +38,96 @@ class About:
     flat: bool = False
 
 
-class Described(Fmi2Slave):  # type: ignore[misc]
-    """A slave that only describes itself.
+class Shell(NamedTuple):
+    """What hosts load of an FMU: tool that made it, whether it needs Python, what it logs."""
+
+    tool: str
+    needs_python: bool
+    log_categories: Mapping[str, str]
+
+
+# What a native FMU sends; hosts choose by these names.
+_LOGGED = {
+    "logStatusWarning": "Warnings: where the motion leaves the model, inputs without effect.",
+    "logStatusError": "Errors: why a call was refused.",
+}
+NATIVE = Shell(f"percussion_model {version('percussion_model')}", False, _LOGGED)
+# pythonfmu would take "logAll" for one of its own categories, and be silent.
+PYTHON = Shell(
+    f"PythonFMU {version('pythonfmu')}",
+    True,
+    {"logEvents": "Events: kernels that are compiled."} | _LOGGED,
+)
+
+
+def write_description(
+    about: About, variables: Sequence[Variable], contents: bytes, shell: Shell = PYTHON
+) -> tuple[str, bytes]:
+    """Return GUID and text of a model description.
 
     Parameters
     ----------
-    about : About
-    variables : sequence of Variable
+    contents : bytes
+        Hash of what else is in the FMU, for the GUID.
     """
+    return sign(_to_xml(about, variables, shell), "guid", contents)
 
-    # What the slaves send; pythonfmu would take "logAll" for one of its own, and be silent.
-    log_categories: ClassVar[dict[str, str]] = {
-        "logEvents": "Events: kernels that are compiled.",
-        "logStatusWarning": "Warnings: where the motion leaves the model, inputs without effect.",
-        "logStatusError": "Errors: why a call was refused.",
+
+def _to_xml(about: About, variables: Sequence[Variable], shell: Shell) -> Element:
+    """Model description whose GUID is still empty."""
+    head = {
+        "fmiVersion": "2.0",
+        "modelName": about.model,
+        "guid": "",
+        "generationTool": shell.tool,
+        "variableNamingConvention": "structured",
+        "description": about.description,
+        "author": about.author,
+        "license": about.license,
+        "version": about.version,
     }
-
-    def __init__(self, about: About, variables: Sequence[Variable]) -> None:
-        super().__init__(instance_name="described")
-        self.about = about
-        self.variables = variables
-        self.modelName = about.model
-        self.description, self.author = about.description, about.author
-        self.version, self.license = about.version, about.license
-        self.default_experiment = DefaultExperiment(0.0, about.stop_time, about.step_size)
-        for variable in variables:
-            found = _PYTHONFMU[variable.type](
-                variable.name,
-                causality=Fmi2Causality[variable.causality],
-                variability=Fmi2Variability[variable.variability],
-                initial=None if variable.causality == "input" else _INITIAL[variable.causality],
-                description=variable.description,
-                getter=lambda value=variable.start: value,
-            )
-            found.value_reference = variable.reference
-            self.vars[variable.reference] = found
-
-    def do_step(self, current_time: float, step_size: float) -> bool:
-        """Never called: this class is not what runs."""
-        raise NotImplementedError
-
-    def to_xml(self, model_options: Any = OPTIONS) -> Element:
-        """Model description; its GUID is a hash of the rest."""
-        root = super().to_xml(model_options)
-        del root.attrib["generationDateAndTime"]  # the same inputs give the same bytes
-        root.set("guid", "")
-        by_name = {variable.name: variable for variable in self.variables}
-        nodes = root.find("ModelVariables")
-        assert nodes is not None
-        for node in nodes:
-            _complete(node, by_name[node.attrib["name"]])
-        at = list(root).index(root.find("CoSimulation")) + 1
-        used = {variable.unit for variable in self.variables if variable.unit}
-        root.insert(at, write_units(used))
-        if any(variable.enumeration for variable in self.variables):
-            root.insert(at + 1, _type_definitions(self.variables))
-        _complete_structure(root, self.variables)
-        if self.about.flat:
-            flatten(root)
-        return root
+    root = Element("fmiModelDescription", head)
+    needs = {"needsExecutionTool": str(shell.needs_python).lower()}
+    model = {"modelIdentifier": about.model, "canNotUseMemoryManagementFunctions": "true"}
+    SubElement(root, "CoSimulation", needs | CAPABILITIES | model)
+    root.append(write_units({variable.unit for variable in variables if variable.unit}))
+    if any(variable.enumeration for variable in variables):
+        root.append(_type_definitions(variables))
+    add_log_categories(root, shell)
+    SubElement(root, "DefaultExperiment", experiment(about))
+    nodes = SubElement(root, "ModelVariables")
+    for variable in variables:
+        nodes.append(_variable(variable))
+    root.append(_structure(variables))
+    if about.flat:
+        flatten(root)
+    return root
 
 
-_PYTHONFMU = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "Enumeration": Integer}
-_INITIAL = {"parameter": Fmi2Initial.exact, "output": Fmi2Initial.calculated}
+def add_log_categories(root: Element, shell: Shell) -> None:
+    """Tell what the FMU logs."""
+    categories = SubElement(root, "LogCategories")
+    for name, text in shell.log_categories.items():
+        SubElement(categories, "Category", {"name": name, "description": text})
 
 
-def _complete(node: Element, variable: Variable) -> None:
-    """Give a variable its unit, bounds, nominal and full digits."""
-    inner = node[0]
-    inner.tag = variable.type
-    attributes: dict[str, Any] = {
+def experiment(about: About) -> dict[str, str]:
+    """Attributes of the default experiment."""
+    times = {"startTime": 0.0, "stopTime": about.stop_time, "stepSize": about.step_size}
+    return {name: repr(float(time)) for name, time in times.items()}
+
+
+def _variable(variable: Variable) -> Element:
+    attributes = {
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": _INITIAL.get(variable.causality),
+    }
+    node = Element("ScalarVariable", {name: text for name, text in attributes.items() if text})
+    said: dict[str, Any] = {
         "declaredType": variable.enumeration,
         "unit": variable.unit,
         "displayUnit": variable.display,
@@ -117,10 +136,13 @@ def _complete(node: Element, variable: Variable) -> None:
         "nominal": variable.nominal,
         "start": variable.start,
     }
-    inner.attrib.clear()
-    for name, value in attributes.items():
-        if value is not None:
-            inner.set(name, value if isinstance(value, str) else to_text(value, variable.type))
+    texts = {
+        name: value if isinstance(value, str) else to_text(value, variable.type)
+        for name, value in said.items()
+        if value is not None
+    }
+    SubElement(node, variable.type, texts)
+    return node
 
 
 def to_text(value: Any, kind: str) -> str:
@@ -157,20 +179,19 @@ def write_items(node: Element, variable: Variable) -> None:
             item.set("description", text)
 
 
-def _complete_structure(root: Element, variables: Sequence[Variable]) -> None:
+def _structure(variables: Sequence[Variable]) -> Element:
     """No output depends on an input at once; at the start some do, and on parameters."""
-    structure = root.find("ModelStructure")
-    assert structure is not None
-    for unknown in structure.iter("Unknown"):
-        unknown.set("dependencies", "")
-    unknowns = SubElement(structure, "InitialUnknowns")
+    root = Element("ModelStructure")
+    outputs, unknowns = SubElement(root, "Outputs"), SubElement(root, "InitialUnknowns")
     for index, variable in enumerate(variables, start=1):
         if variable.causality != "output":
             continue
         known = [
             str(at) for at, one in enumerate(variables, start=1) if depends_at_start(variable, one)
         ]
+        SubElement(outputs, "Unknown", {"index": str(index), "dependencies": ""})
         SubElement(unknowns, "Unknown", {"index": str(index), "dependencies": " ".join(known)})
+    return root
 
 
 def depends_at_start(output: Variable, known: Variable) -> bool:
@@ -178,24 +199,6 @@ def depends_at_start(output: Variable, known: Variable) -> bool:
     if output.at_start is None:
         return False
     return known.causality == "parameter" or known.name in output.at_start
-
-
-def write_description(
-    about: About,
-    variables: Sequence[Variable],
-    contents: bytes,
-    described: type[Described] = Described,
-) -> tuple[str, bytes]:
-    """Return GUID and text of a model description.
-
-    Parameters
-    ----------
-    contents : bytes
-        Hash of what else is in the FMU, for the GUID.
-    described : type
-        What writes all but the GUID.
-    """
-    return sign(described(about, variables).to_xml(), "guid", contents)
 
 
 def sign(root: Element, attribute: str, contents: bytes) -> tuple[str, bytes]:

@@ -29,6 +29,9 @@ libraries that compute; on a platform without one Python needs numpy and numba t
 when kernels are used for the first time (about a minute). They are kept in the user's cache
 folder; the environment variable <code>PERCUSSION_FMU_CACHE</code> names another one.</p>
 """
+NEEDS_NOTHING = """<p>Needs nothing but the C library of the system. There are libraries for
+{platforms}; the numbers of the scene lie in <code>resources/model.bin</code>.</p>
+"""
 ERRORS = """
 <p>No output carries an error. {grid} Errors of the rock's parameters and of the model itself come
 on top.</p>

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable, Mapping
+from html import escape
 from pathlib import Path
 from typing import Literal
 
 from fmu_src.archive import HERE, MODEL, SCENE, digest, licence, write_described
-from fmu_src.description import About
+from fmu_src.description import NATIVE, About, write_description
 from fmu_src.hammer.variables import hammer_variables
-from fmu_src.native.description import write_native_description
 from fmu_src.native.description3 import write_description3
-from fmu_src.native.page import write_native_page
+from fmu_src.native.library import ALIASES
 from fmu_src.native.terminals import FOLDER, write_terminals
 from fmu_src.native.variables3 import fmi3_variables
+from fmu_src.page import NEEDS_NOTHING, write_page
 from fmu_src.slave.native import SUFFIXES
 from fmu_src.variables import to_json
 from percussion_model.scene.scene import Scene
 
 Version = Literal["2.0", "3.0"]
 # FMI 2.0 has names of its own for x86, and takes those of FMI 3.0 for all others (2.0.5).
-FMI2_PLATFORMS = {
-    "x86_64-linux": "linux64",
-    "x86_64-windows": "win64",
-    "x86_64-darwin": "darwin64",
-}
+FMI2_PLATFORMS = {name: alias for alias, name in ALIASES.items()}
 
 
 def write_native_fmu(
@@ -49,7 +46,8 @@ def write_native_fmu(
         for an empty one as well, whose tables are part of what the GUID is a hash of.
     """
     variables = hammer_variables(scene)
-    page = write_native_page(about, variables, scene, libraries)
+    needs = NEEDS_NOTHING.format(platforms=escape(", ".join(sorted(libraries))))
+    page = write_page(about, variables, scene, needs)
     entries = {
         "documentation/index.html": page.encode(),
         "documentation/licenses/license.txt": licence(),
@@ -62,7 +60,7 @@ def write_native_fmu(
         entries[library_path(version, platform, about.model)] = library
     contents = digest(entries)
     if version == "2.0":
-        guid, xml = write_native_description(about, variables, contents)
+        guid, xml = write_description(about, variables, contents, NATIVE)
     else:
         guid, xml = write_description3(about, variables, fmi3_variables(scene), contents)
     entries[MODEL] = model(f"{{{guid}}}")

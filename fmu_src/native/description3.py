@@ -7,15 +7,17 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from fmu_src.description import (
+    NATIVE,
     About,
+    add_log_categories,
     depends_at_start,
     enumerations,
+    experiment,
     sign,
     to_text,
     write_items,
 )
 from fmu_src.flat_names import flatten
-from fmu_src.native.description import GENERATION_TOOL, LOG_CATEGORIES
 from fmu_src.native.variables3 import Variable3
 from fmu_src.units import write_units
 from fmu_src.variables import Variable
@@ -67,10 +69,8 @@ def _to_xml(about: About, variables: Sequence[Variable], arranged: Sequence[Vari
     kinds = SubElement(root, "TypeDefinitions")
     for one in enumerations(variables):
         write_items(SubElement(kinds, "EnumerationType", {"name": str(one.enumeration)}), one)
-    categories = SubElement(root, "LogCategories")
-    for name, text in LOG_CATEGORIES.items():
-        SubElement(categories, "Category", {"name": name, "description": text})
-    SubElement(root, "DefaultExperiment", _experiment(about))
+    add_log_categories(root, NATIVE)
+    SubElement(root, "DefaultExperiment", experiment(about))
     by_name = {variable.name: variable for variable in variables}
     nodes = SubElement(root, "ModelVariables")
     for entry in arranged:
@@ -90,14 +90,9 @@ def _head(about: About) -> dict[str, str]:
         "author": about.author,
         "version": about.version,
         "license": about.license,
-        "generationTool": GENERATION_TOOL,
+        "generationTool": NATIVE.tool,
         "variableNamingConvention": "structured",
     }
-
-
-def _experiment(about: About) -> dict[str, str]:
-    times = {"startTime": 0.0, "stopTime": about.stop_time, "stepSize": about.step_size}
-    return {name: repr(float(time)) for name, time in times.items()}
 
 
 def _variable(entry: Variable3, members: Sequence[Variable]) -> Element:

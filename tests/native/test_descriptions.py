@@ -15,12 +15,11 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from fmu_src.archive import MODEL, SCENE
-from fmu_src.description import write_description
+from fmu_src.description import NATIVE, write_description
 from fmu_src.hammer.build import about_hammer
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.native import reference_results
 from fmu_src.native.archive import add_files, library_path, write_native_fmu
-from fmu_src.native.description import write_native_description
 from fmu_src.native.reference_results import add_reference_results, experiments
 from fmu_src.native.terminals import TERMINALS
 from fmu_src.native.variables3 import fmi3_variables
@@ -106,7 +105,7 @@ def test_variables_of_fmi2_are_those_of_the_other_fmu(scene):
     variables = hammer_variables(scene)
     texts = (
         write_description(about, variables, b""),
-        write_native_description(about, variables, b""),
+        write_description(about, variables, b"", NATIVE),
     )
     ours, theirs = (ElementTree.fromstring(text) for _, text in texts)
     for part in ("UnitDefinitions", "TypeDefinitions", "ModelVariables", "ModelStructure"):
@@ -169,7 +168,7 @@ def test_structure_of_fmi3_is_that_of_fmi2(fmu3, scene):
     """Dependencies by names of FMI 2.0: members of an array all matter, or none does."""
     about = about_hammer(scene, Path("PercussiveHammer.fmu"))
     variables = hammer_variables(scene)
-    root = ElementTree.fromstring(write_native_description(about, variables, b"")[1])
+    root = ElementTree.fromstring(write_description(about, variables, b"", NATIVE)[1])
     expected = {
         variables[int(node.get("index")) - 1].name: {
             variables[int(index) - 1].name for index in node.get("dependencies").split()
