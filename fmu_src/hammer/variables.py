@@ -18,7 +18,7 @@ from typing import Any
 from fmu_src.hammer.inputs import NAMES_OUTSIDE
 from fmu_src.hammer.outputs import MODES, OUTPUTS
 from fmu_src.units import fmi_unit
-from fmu_src.variables import Variable, magnitude, number_row
+from fmu_src.variables import Causality, Variable, magnitude, number_row
 from percussion_model.components import COMPONENTS
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import find_row, parameter_table
@@ -122,9 +122,6 @@ def split_drive_force(force: float) -> tuple[float, float]:
 
 
 def _inputs(scene: Scene) -> Iterator[Variable]:
-    pressure, _ = split_drive_force(scene.drive.force)
-    starts: dict[str, Any] = {name: scene[one.key] for name, one in TABLE_INPUTS.items()}
-    starts |= {"supply_pressure": pressure, "percussion_on": True}
     order = ["feed_force", "supply_pressure", "piston_force", "percussion_on"]
     order += [name for name in TABLE_INPUTS if name not in order]
     for name in order:
@@ -139,13 +136,15 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
                 start=True,
             )
             continue
-        one = TABLE_INPUTS.get(name)
-        row, note = PRESSURE_ROW if one is None else _row(one.key), ""
+        if name == "supply_pressure":
+            yield _number(PRESSURE_ROW, split_drive_force(scene.drive.force)[0], "input")
+            continue
+        one, note = TABLE_INPUTS[name], ""
         if name == "piston_force":
             note = "; acts while effects.drive = external and percussion_on"
-        elif one is not None and not one.at_once:
+        elif not one.at_once:
             note = "; acts from the next drilling cycle on"
-        yield _number(name, reference(name, "input"), row, starts[name], "input", note)
+        yield _number(_row(one.key), scene[one.key], "input", name, note=note)
 
 
 def _outputs() -> Iterator[Variable]:
@@ -186,25 +185,12 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
             continue
         if row.key not in replaced:
             yield _parameter(row.key, row, scene[row.key])
-    _, area = split_drive_force(scene.drive.force)
-    yield _number(
-        "drive.effective_area",
-        reference("drive.effective_area", "parameter"),
-        AREA_ROW,
-        area,
-        "parameter",
-    )
+    yield _number(AREA_ROW, split_drive_force(scene.drive.force)[1])
     carriers = gauge_bars(scene)
     bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(carriers))
     gauge = _parameter("gauge.bar", _choice_row("gauge.bar", carriers), "bit")
     yield replace(gauge, key=None, enumeration="Bar", items=bars)
-    yield _number(
-        "gauge.position",
-        reference("gauge.position", "parameter"),
-        PLACE_ROW,
-        0.5 * scene.bit.length,
-        "parameter",
-    )
+    yield _number(PLACE_ROW, 0.5 * scene.bit.length)
 
 
 def gauge_bars(scene: Scene) -> tuple[str, ...]:
@@ -218,7 +204,7 @@ def _sections(scene: Scene, bar: str, first: int) -> Iterator[Variable]:
         for k, field in enumerate(fields):
             key = f"{bar}.sections.{i}.{field}"
             number = first + SECTION * i + k
-            yield _number(_outside(key), number, _row(key), scene[key], "parameter", key=key)
+            yield _number(_row(key), scene[key], name=_outside(key), number=number, key=key)
 
 
 def _rods(scene: Scene, rods: str) -> Iterator[Variable]:
@@ -231,7 +217,7 @@ def _rods(scene: Scene, rods: str) -> Iterator[Variable]:
             row = _row(key)
             if row.kind == "number":
                 number = first + JOINT + list(rod.rows).index(name)
-                yield _number(_outside(key), number, row, scene[key], "parameter", key=key)
+                yield _number(row, scene[key], name=_outside(key), number=number, key=key)
 
 
 def _outside(key: str) -> str:
@@ -242,7 +228,7 @@ def _outside(key: str) -> str:
 
 def _parameter(key: str, row: ParameterRow, value: Any) -> Variable:
     if row.kind == "number" or row.kind == "whole number":
-        return _number(key, reference(key, "parameter"), row, value, "parameter", key=key)
+        return _number(row, value, key=key)
     common: dict[str, Any] = {
         "name": key, "reference": reference(key, "parameter"),
         "causality": "parameter", "variability": "fixed",
@@ -268,15 +254,16 @@ def _parameter(key: str, row: ParameterRow, value: Any) -> Variable:
 
 
 def _number(
-    name: str,
-    number: int,
     row: ParameterRow,
     value: Any,
-    causality: Any,
+    causality: Causality = "parameter",
+    name: str = "",
+    number: int | None = None,
     note: str = "",
     key: str | None = None,
 ) -> Variable:
-    """A number with the unit and the bounds of its row."""
+    """A number with unit and bounds of its row, and its name unless another one is given."""
+    name = name or row.key
     left_out, meaning = LEFT_OUT.get(row.key, (None, ""))
     lower = row.lower if left_out is None else min(left_out, row.lower or 0.0)
     whole = row.kind == "whole number"
@@ -284,7 +271,7 @@ def _number(
     start: Any = left_out if value is None else value
     return Variable(
         name=name,
-        reference=number,
+        reference=reference(name, causality) if number is None else number,
         type="Integer" if whole else "Real",
         causality=causality,
         description=_described(row) + note + (f" ({meaning})" if meaning else ""),
