@@ -21,7 +21,7 @@ from fmu_src.units import fmi_unit
 from fmu_src.variables import Causality, Variable, magnitude, number_row
 from percussion_model.components import COMPONENTS
 from percussion_model.scene.inputs import INPUTS
-from percussion_model.scene.parameters import find_row, parameter_table
+from percussion_model.scene.parameters import parameter_table, row_of
 from percussion_model.scene.rows import ParameterRow
 from percussion_model.scene.scene import Scene
 
@@ -144,7 +144,7 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
             note = "; acts while effects.drive = external and percussion_on"
         elif not one.at_once:
             note = "; acts from the next drilling cycle on"
-        yield _number(_row(one.key), scene[one.key], "input", name, note=note)
+        yield _number(row_of(one.key), scene[one.key], "input", name, note=note)
 
 
 def _outputs() -> Iterator[Variable]:
@@ -204,7 +204,7 @@ def _sections(scene: Scene, bar: str, first: int) -> Iterator[Variable]:
         for k, field in enumerate(fields):
             key = f"{bar}.sections.{i}.{field}"
             number = first + SECTION * i + k
-            yield _number(_row(key), scene[key], name=_outside(key), number=number, key=key)
+            yield _number(row_of(key), scene[key], name=_outside(key), number=number, key=key)
 
 
 def _rods(scene: Scene, rods: str) -> Iterator[Variable]:
@@ -214,7 +214,7 @@ def _rods(scene: Scene, rods: str) -> Iterator[Variable]:
         yield from _sections(scene, f"{rods}.{i}", first)
         for name in rod.telling:
             key = f"{rods}.{i}.{name}"
-            row = _row(key)
+            row = row_of(key)
             if row.kind == "number":
                 number = first + JOINT + list(rod.rows).index(name)
                 yield _number(row, scene[key], name=_outside(key), number=number, key=key)
@@ -295,10 +295,3 @@ def _described(row: ParameterRow) -> str:
 def _choice_row(key: str, choices: tuple[str, ...]) -> ParameterRow:
     row = number_row(key, "", 0.0, 0.0, "bar that carries the gauge")
     return replace(row, kind="choice", choices=choices)
-
-
-def _row(key: str) -> ParameterRow:
-    row = find_row(key)
-    if row is None:
-        raise KeyError(key)
-    return row

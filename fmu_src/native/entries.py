@@ -35,13 +35,14 @@ from percussion_model.engine.image import (
 from percussion_model.engine.layout import blow_records, head_records, motion_of, motion_records
 from percussion_model.engine.memory import floats_at, hold, words_at
 from percussion_model.engine.records import MOTION_BYTES, GaugeBar, Kind, Left
-from percussion_model.engine.scene_image import AT, Own, row_of
+from percussion_model.engine.scene_image import AT, Own
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import BLOW, DRIVES, DriveKind, Piston, Status
 from percussion_model.physics.state import LARGEST, MOST
 from percussion_model.scene.bars import bar_length, bar_mass
 from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
 from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.parameters import row_of
 from percussion_model.scene.rock_law import POWER, ROCKS, barrier_on, rock_numbers
 from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.values import SCENE_NUMBERS

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from percussion_model.engine.records import KINDS, Kind
-from percussion_model.engine.scene_image import row_of
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Piston
 from percussion_model.scene.bars import bar_transit_time
+from percussion_model.scene.parameters import row_of
 from percussion_model.scene.rock_law import is_wall
 from percussion_model.scene.solver_choice import WhyWaves, why_waves
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes

@@ -13,7 +13,7 @@ import numpy as np
 
 from percussion_model.engine.faults import Fault
 from percussion_model.scene.contradictions import TEXTS
-from percussion_model.scene.parameters import find_row
+from percussion_model.scene.parameters import row_of
 from percussion_model.solvers.fem.records import FEM_LIMITS
 from percussion_model.solvers.modal.faults import FAULTS as MODAL_FAULTS
 from percussion_model.solvers.modal.records import MODAL_LIMITS
@@ -86,8 +86,7 @@ def _of_rule(text: str) -> str:
     keys = keys_in(text)
 
     def place(found: re.Match[str]) -> str:
-        row = find_row(found[1])
-        assert row is not None
+        row = row_of(found[1])
         form = f"|{'|'.join(row.choices)}|" if row.choices else "r"
         if row.kind == "whole number":
             form = "d"

@@ -12,8 +12,6 @@ from enum import IntEnum
 import numpy as np
 
 from percussion_model.scene.numbers import Numbers
-from percussion_model.scene.parameters import find_row
-from percussion_model.scene.rows import ParameterRow
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers.state import words_of
 
@@ -21,13 +19,6 @@ COUNTS = 3  # words before the sections of each rod
 VALUES = SCENE_NUMBERS.itemsize // 8
 SECTION, JOINT = 4, 6
 AT = words_of(SCENE_NUMBERS)
-
-
-def row_of(key: str) -> ParameterRow:
-    """Row of the parameter table."""
-    row = find_row(key)
-    assert row is not None, key
-    return row
 
 
 class Own(IntEnum):

@@ -24,7 +24,7 @@ from percussion_model.interface.plotting.window import (
     peak_stresses,
 )
 from percussion_model.physics.gas import FREE_AIR
-from percussion_model.scene.parameters import HOLE_DIAMETER, find_row, parameter_table
+from percussion_model.scene.parameters import HOLE_DIAMETER, parameter_table, row_of
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_text
 from percussion_model.simulation.files import staged
@@ -464,8 +464,7 @@ def _rows_of(value: Any, key: str, changed: dict[str, Any]) -> list[tuple[str, s
             for name in entry.telling
             for row in _rows_of(getattr(entry, name), f"{key}.{k}.{name}", changed)
         ]
-    row = find_row(key)
-    assert row is not None
+    row = row_of(key)
     shown = _written(changed.get(key, value))
     return [(key, shown, _shown_unit(row.unit), row.description)]
 

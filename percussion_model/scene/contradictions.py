@@ -9,7 +9,7 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from percussion_model.scene.parameters import find_row
+from percussion_model.scene.parameters import row_of
 
 
 class Rule(IntEnum):
@@ -143,9 +143,7 @@ class Bodies(IntEnum):
 
 
 def _place(key: str, word: str) -> int:
-    row = find_row(key)
-    assert row is not None
-    return list(row.choices).index(word)
+    return list(row_of(key).choices).index(word)
 
 
 ELASTIC, RIGID = _place("bit.model", "elastic"), _place("bit.model", "rigid")

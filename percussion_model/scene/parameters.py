@@ -12,6 +12,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from typing import Any, Self
 
@@ -526,6 +527,14 @@ def find_row(key: str) -> ParameterRow | None:
     return rows_by_key().get(generic_key(key))
 
 
+def row_of(key: str) -> ParameterRow:
+    """Return the row of a dotted key; `SceneError` if there is none."""
+    row = find_row(key)
+    if row is None:
+        raise SceneError(unknown_key(key))
+    return row
+
+
 def read_number(key: str, text: str, name: str = "") -> float:
     """Read a number of a parameter: of SI, or with its unit. Bounds are not looked at.
 
@@ -543,18 +552,12 @@ def read_number(key: str, text: str, name: str = "") -> float:
     SceneError
         If there is no such key, or the text is no such number.
     """
-    row = find_row(key)
-    if row is None:
-        raise SceneError(unknown_key(key))
-    try:
+    row = row_of(key)
+    with suppress(ValueError):
         return float(text)
-    except ValueError:
-        pass
-    try:
+    with suppress(UnitError):
         if row.kind == "number":
             return in_si(text, row.unit)
-    except UnitError:
-        pass
     raise SceneError(refuse(row, name or key, text))
 
 
@@ -574,24 +577,20 @@ def unknown_key(key: str) -> str:
         return f"{key}: {BLOW_MAP}"
     if is_counted:
         return f"unknown key {key}: did you mean {counted}? Scenes count from 0, FMUs from 1"
-    prefix = generic_key(parent) + "." if parent else ""
-    keys = rows_by_key()
-    siblings = [one.removeprefix(prefix) for one in keys if one.startswith(prefix)]
-    siblings = [one for one in siblings if "." not in one]
+    keys, above = rows_by_key(), generic_key(parent)
+    siblings = [one.rpartition(".")[2] for one in keys if one.rpartition(".")[0] == above]
     if parent and (meant := nearest(name, siblings)):
         return f"unknown key {key}: did you mean {shortened(parent, LONGEST_KEY)}.{meant}?"
     underlined = {one.replace(".", "_"): one for one in keys}
     if key in underlined:  # as keyword arguments of Python are written
         return f"unknown key {key}: did you mean {underlined[key]}?"
     known = list(keys) if parent else ["title", HOLE_DIAMETER.key, *GROUPS]
-    near = difflib.get_close_matches(generic_key(key), known, 1, SIMILAR_ENOUGH)
-    if near:
+    if near := difflib.get_close_matches(generic_key(key), known, 1, SIMILAR_ENOUGH):
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:
         parent = shortened(parent, LONGEST_KEY)
         return f"unknown key {key}: [{parent}] has the keys {', '.join(siblings)}"
-    groups = [one for one in GROUPS if one in key.split(".")]
-    if groups:
+    if groups := [one for one in GROUPS if one in key.split(".")]:
         of_group = [one for one in keys if one.startswith(f"{groups[-1]}.") and "*" not in one]
         return f"unknown key {key}: did you mean one of {', '.join(of_group)}?"
     return f"unknown key {key}: a scene has a title and the tables {', '.join(GROUPS)}"

@@ -29,6 +29,7 @@ from percussion_model.scene.parameters import (
     Start,
     find_row,
     parameter_table,
+    row_of,
     unknown_key,
 )
 from percussion_model.scene.retired import BLOW_MAP_TABLE
@@ -310,10 +311,7 @@ class Scene:
 
     def row_of(self, key: str) -> ParameterRow:
         """Row of a dotted key in the parameter table."""
-        row = find_row(key)
-        if row is None:
-            raise SceneError(unknown_key(key))
-        return row
+        return row_of(key)
 
     def matters(self, key: str) -> bool:
         """Tell whether a parameter has any influence on this scene."""

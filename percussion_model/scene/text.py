@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import functools
 import os
 import re
 import sys
@@ -36,6 +37,16 @@ _HEADER = (
     "# forces on contact and rock are positive in compression. What is left out takes",
     "# its default, which is the value of the reference scene.",
 )
+
+
+@functools.cache
+def _names_in(folder: Path) -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in folder.glob("[!_]*.toml")))
+
+
+def stored_names(folder: Path) -> list[str]:
+    """Names under which bits, rocks or hammers are stored in a folder."""
+    return list(_names_in(folder))
 
 
 def read_stored(what: str, name: str, names: Collection[str], folder: Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from percussion_model.scene.rocks import Number
 from percussion_model.scene.scene import Scene
-from percussion_model.scene.text import read_stored
+from percussion_model.scene.text import read_stored, stored_names
 
 _HERE = Path(__file__).parent
 # Revolutions in a minute are this divided by the diameter in inches (a maker's rule for
@@ -86,12 +86,7 @@ class ButtonBit:
 
 def bits() -> list[str]:
     """Names of the bits that there are, by kind and size."""
-    return list(_names())
-
-
-@cache
-def _names() -> tuple[str, ...]:
-    return tuple(sorted((path.stem for path in _HERE.glob("*.toml")), key=_kind_and_size))
+    return sorted(stored_names(_HERE), key=_kind_and_size)
 
 
 def _kind_and_size(name: str) -> tuple[str, int]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from percussion_model.scene.rows import SceneError, shortened
-from percussion_model.scene.text import read_stored
+from percussion_model.scene.text import read_stored, stored_names
 
 _HERE = Path(__file__).parent
 # More buttons than any bit has.
@@ -44,6 +44,10 @@ class Number:
     kind: str
     why: str
     second_hand: bool = False
+
+    def times(self, value: float, low: float, high: float) -> Self:
+        """Return the number times a share, and its interval times that of the share."""
+        return replace(self, value=value * self.value, low=low * self.low, high=high * self.high)
 
 
 @dataclass(frozen=True)
@@ -119,23 +123,19 @@ class Rock:
                 "for it without a number of buttons"
             )
         share = 1.0 if self.law == "power" else count / self.buttons
-        numbers = tuple(
-            replace(one, value=share * one.value, low=share * one.low, high=share * one.high)
-            if one.key == STIFFNESS
-            else one
-            for one in self.numbers
+        return replace(self.with_stiffness_times(share, share, share), asked=count)
+
+    def with_stiffness_times(self, value: float, low: float, high: float) -> Rock:
+        """Return the same rock with its loading stiffness times a share, as `Number.times`."""
+        numbers = (
+            one.times(value, low, high) if one.key == STIFFNESS else one for one in self.numbers
         )
-        return replace(self, numbers=numbers, asked=count)
+        return replace(self, numbers=tuple(numbers))
 
 
 def rocks() -> list[str]:
     """Names of the rocks that there are."""
-    return list(_names())
-
-
-@cache
-def _names() -> tuple[str, ...]:
-    return tuple(sorted(path.stem for path in _HERE.glob("*.toml")))
+    return stored_names(_HERE)
 
 
 def rock(name: str, buttons: int | None = None) -> Rock:

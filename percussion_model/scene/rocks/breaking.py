@@ -8,7 +8,6 @@ a = 149 MPa (Paone et al. 1969, second hand; docs/breaking.md).
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 from percussion_model.scene.bits import MEASURED_THRESHOLD, THRESHOLD, bit, bit_of
@@ -105,18 +104,7 @@ def on_bottom(rock: Rock, buttons: int | None) -> Rock:
         return rock
     share = CONTACT_SHARE
     whole = rock if rock.asked else rock.of_buttons(buttons or rock.buttons)
-    numbers = tuple(
-        replace(
-            one,
-            value=share.value * one.value,
-            low=share.low * one.low,
-            high=share.high * one.high,
-        )
-        if one.key == STIFFNESS
-        else one
-        for one in whole.numbers
-    )
-    return replace(whole, numbers=numbers)
+    return whole.with_stiffness_times(share.value, share.low, share.high)
 
 
 def numbers_under(rock: Rock, scene: Scene) -> tuple[Number, ...]:
@@ -136,9 +124,7 @@ def _under_buttons(number: Number, name: str) -> Number:
     if number.key != THRESHOLD or not name:
         return number
     share = bit(name).threshold_share
-    return replace(
-        number, value=share * number.value, low=share * number.low, high=share * number.high
-    )
+    return number.times(share, share, share)
 
 
 def parameters_under(rock: Rock, scene: Scene) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from percussion_model.scene.hammers import hammers as scenes
 from percussion_model.scene.rocks import Number
 from percussion_model.scene.rows import SceneError, said_among, shortened, show_value
-from percussion_model.scene.text import read_stored, read_toml
+from percussion_model.scene.text import read_stored, read_toml, stored_names
 
 _HERE = Path(__file__).parent
 # Read in a source; computed from others of the hammer; a guess with its reason.
@@ -149,14 +149,9 @@ def sources() -> dict[str, dict[str, Any]]:
     return read_toml(_HERE / "_sources.toml")
 
 
-@cache
-def _names() -> tuple[str, ...]:
-    return tuple(sorted(path.stem for path in _HERE.glob("[!_]*.toml")))
-
-
 def stored_hammers() -> list[str]:
     """Names of the hammers that are stored."""
-    return list(_names())
+    return stored_names(_HERE)
 
 
 @cache
