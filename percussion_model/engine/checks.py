@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from percussion_model.engine.faults import Fault
 from percussion_model.engine.layout import directory
 from percussion_model.engine.memory import floats_at, words_at
 from percussion_model.engine.records import RECORD
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.state import first_beyond, is_bounded
+
+# A state is no more than a step, and rounding, behind the present [steps].
+MOST_BEHIND = 2.0
 
 
 @preparing
@@ -40,6 +44,13 @@ def record_fault(moving, low, high, may_be_nan, whole, number, facts):
     facts[1] = float(words[k]) if whole[k] else numbers[k]
     facts[2], facts[3] = low[k], high[k]
     return number
+
+
+@preparing
+def time_fault(state_time, t, step, facts):
+    """Number of the fault of a state far behind the present, 0 for none; fills the facts."""
+    facts[0], facts[1] = state_time, t
+    return 0 if state_time >= t - MOST_BEHIND * step else Fault.BEHIND.value
 
 
 @preparing

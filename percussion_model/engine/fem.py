@@ -4,25 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from percussion_model.engine.checks import arrays_are_bounded, record_fault
+from percussion_model.engine import layout
+from percussion_model.engine.checks import arrays_are_bounded, record_fault, time_fault
 from percussion_model.engine.defaults import shape_form, shapes, table_key  # noqa: F401  # entries
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import new_values, numbers_in
-from percussion_model.engine.layout import (
-    blow_records,
-    blow_rows,
-    copy_words,
-    describe,
-    directory,
-    event_records,
-    event_rows,
-    head_records,
-    make_memory,
-    reading_of,
-    reading_records,
-    set_gauge,
-    views_of,
-)
 from percussion_model.engine.memory import (
     enter,
     floats_2,
@@ -35,7 +21,7 @@ from percussion_model.engine.memory import (
     viewing,
     words_at,
 )
-from percussion_model.engine.records import ADVANCE, RECORD, GaugeBar, Kind, work_at
+from percussion_model.engine.records import ADVANCE, GaugeBar, Kind, work_at
 from percussion_model.engine.sampling import sampler
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
@@ -61,7 +47,7 @@ from percussion_model.solvers.fem.records import (
 from percussion_model.solvers.setup import MOST_CELLS
 from percussion_model.solvers.state import words_of
 
-parameters, state_in = views_of(FEM_PAR, FEM_STATE)
+parameters, state_in = layout.views_of(FEM_PAR, FEM_STATE)
 new_parameters = new_record(FEM_PAR)
 LOW, HIGH, MAY_BE_NAN, WHOLE = FEM_LIMITS.rows
 PAR_BYTES = FEM_PAR.itemsize
@@ -69,15 +55,13 @@ WORK = work_at(FEM_STATE)  # place of the nodes in what moves
 ROWS_LISTED = tuple(words_of(FEM_STATE)[name] for name in ("n_blows", "n_events"))
 ROWS, FACTOR_ROWS, KEYS, STAGES = len(Node), 2 * len(Factor), len(Key), len(Stage)
 PROBES, COLUMNS = len(Probe), len(Column)
-# A state is no more than a step, and rounding, behind the present [steps].
-MOST_BEHIND = 2.0
 MESH, FACTORS, TRIAL, PROBE, NODES = range(5)
 
 
 @viewing
 def elements_in(base, moving):
     """`Elements` of what moves, or of a copy of it, at an address."""
-    d = directory(base)
+    d = layout.directory(base)
     return Elements(
         floats_2(moving, d, NODES), floats_2(base, d, MESH), floats_2(base, d, FACTORS),
         floats_2(base, d, TRIAL), floats_2(base, d, PROBE),
@@ -106,24 +90,24 @@ def _make(numbers, bar, place):
         np.zeros((FACTOR_ROWS, max(n, KEYS))), np.zeros((STAGES, n)), np.zeros((PROBES, COLUMNS)),
     )  # fmt: skip
     moving = WORK + lines(8 * ROWS * n)
-    base, room_at, tables_at = make_memory(
+    base, room_at, tables_at = layout.make_memory(
         Kind.FEM.value, PAR_BYTES, moving, table_bytes(room), table_bytes((mesh,))
     )
     if base == 0:
         return base
-    d = directory(base)
+    d = layout.directory(base)
     put_tables(base, d, MESH, tables_at, (mesh,))
     put_tables(base, d, FACTORS, room_at, room)
     enter(d, NODES, WORK, ROWS, n)
     parameters(base)[0] = par[0]
-    describe(base, ROWS_LISTED, (NODES, 1), par[0].dt, 0.0)
+    layout.describe(base, ROWS_LISTED, (NODES, 1), par[0].dt, 0.0)
     hold(par)
     if bar != GaugeBar.NONE:
         masses, sections = bars.bit.mass, numbers.bit
         if bar == GaugeBar.PISTON:
             masses, sections = bars.piston.mass, numbers.piston
         cell, area = find_cell(sections, masses, place)
-        set_gauge(base, bar, cell, 0.0, 0.0, area)
+        layout.set_gauge(base, bar, cell, 0.0, 0.0, area)
     return base
 
 
@@ -134,7 +118,7 @@ def create(image, bar, place, like):
     numbers = numbers_in(image, values)
     base = _make(numbers, bar, place)
     if base != 0:
-        at = base + head_records(base, 1)[0].state_at
+        at = base + layout.head_records(base, 1)[0].state_at
         elements = elements_in(base, at)
         begin(parameters(base)[0], state_in(at)[0], elements.w, elements.c, numbers)
     hold(values)
@@ -178,26 +162,26 @@ def run(base, moving, task, t, blows, room, events, event_room, events_on):
     state[0].events_on = events_on
     wanted = FemTask.ADVANCE.value if task == ADVANCE else FemTask.COMMIT.value
     return run_task(
-        wanted, parameters(base), state, elements_in(base, moving), t, blow_records(blows, room),
-        event_records(events, event_room), reading_of(base),
+        wanted, parameters(base), state, elements_in(base, moving), t,
+        layout.blow_records(blows, room), layout.event_records(events, event_room),
+        layout.reading_of(base),
     )  # fmt: skip
 
 
 @preparing
 def read(base, moving, copy, t, reading, peaks):
     """Carry a copy of what moves to a time and read it; a `Status`."""
-    count = (head_records(base, 1)[0].state_bytes - RECORD) // 8
-    copy_words(moving + RECORD, copy + RECORD, count)
+    layout.copy_moving(base, moving, copy)
     return run_task(
         FemTask.READ.value, parameters(base), state_in(copy), elements_in(base, copy), t,
-        blow_rows(base), event_rows(base), reading_records(reading, 1),
+        layout.blow_rows(base), layout.event_rows(base), layout.reading_records(reading, 1),
     )  # fmt: skip
 
 
 @preparing
 def stress(base, moving):
     """Stress at the gauge in a copy of what moves [Pa]."""
-    head, elements = head_records(base, 1)[0], elements_in(base, moving)
+    head, elements = layout.head_records(base, 1)[0], elements_in(base, moving)
     first = 0 if head.gauge_bar == GaugeBar.PISTON else parameters(base)[0].n_p
     return force_in(elements.c, elements.w, first, head.gauge_cell) / head.gauge_area
 
@@ -211,8 +195,7 @@ def find_fault(base, moving, t, facts):
         return fault
     if not arrays_are_bounded(base, moving, NODES, 1):
         return Fault.WORKSPACE.value
-    told[0], told[1] = state_time(base, moving), t
-    return 0 if told[0] >= t - MOST_BEHIND * parameters(base)[0].dt else Fault.BEHIND.value
+    return time_fault(state_time(base, moving), t, parameters(base)[0].dt, told)
 
 
 @preparing

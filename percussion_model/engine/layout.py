@@ -158,6 +158,13 @@ def copy_words(source, to, count):
         there[k] = here[k]
 
 
+@viewing
+def copy_moving(base, moving, copy):
+    """Copy what moves to where it may be carried on: all behind what a host keeps there."""
+    count = (head_records(base, 1)[0].state_bytes - RECORD) // 8
+    copy_words(moving + RECORD, copy + RECORD, count)
+
+
 @preparing
 def describe(base, listed, rows, time_step, misfit):
     """Enter what hosts are told of a motion.

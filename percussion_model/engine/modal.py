@@ -6,24 +6,10 @@ import math
 
 import numpy as np
 
+from percussion_model.engine import layout
 from percussion_model.engine.checks import arrays_are_bounded, record_fault
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import new_values, numbers_in
-from percussion_model.engine.layout import (
-    blow_records,
-    blow_rows,
-    copy_words,
-    describe,
-    directory,
-    event_records,
-    event_rows,
-    head_records,
-    make_memory,
-    reading_of,
-    reading_records,
-    set_gauge,
-    views_of,
-)
 from percussion_model.engine.memory import (
     enter,
     floats_1,
@@ -42,7 +28,7 @@ from percussion_model.engine.memory import (
     words_2,
     words_at,
 )
-from percussion_model.engine.records import ADVANCE, RECORD, GaugeBar, Kind, work_at
+from percussion_model.engine.records import ADVANCE, GaugeBar, Kind, work_at
 from percussion_model.engine.sampling import sampler
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
@@ -77,7 +63,7 @@ from percussion_model.solvers.modal.resolution import MOST_MODES
 from percussion_model.solvers.setup import elastic_piston
 from percussion_model.solvers.state import words_of
 
-parameters, state_in = views_of(MODAL_PAR, MODAL_STATE)
+parameters, state_in = layout.views_of(MODAL_PAR, MODAL_STATE)
 new_parameters = new_record(MODAL_PAR)
 LOW, HIGH, MAY_BE_NAN, WHOLE = MODAL_LIMITS.rows
 PAR_BYTES = MODAL_PAR.itemsize
@@ -96,7 +82,7 @@ ROWS, PISTON_ROWS, ROOM = 8, 2, 8
 @viewing
 def bars_in(base, moving):
     """`Bars` of what moves, or of a copy of it, at an address."""
-    d = directory(base)
+    d = layout.directory(base)
     forms = Forms(
         words_1(base, d, SIZES), floats_1(base, d, STIFF), floats_3(base, d, SHAPE),
         floats_4(base, d, MOVE), floats_3(base, d, YIELDS), floats_4(base, d, CHANGE),
@@ -175,9 +161,9 @@ def gauge_rows(numbers, made, dt, bar, place):
 @preparing
 def stress(base, moving):
     """Stress at the gauge in a copy of what moves [Pa]."""
-    head = head_records(base, 1)[0]
+    head = layout.head_records(base, 1)[0]
     par, s, bars = parameters(base)[0], state_in(moving)[0], bars_in(base, moving)
-    rows = floats_2(base, directory(base), GAUGE_AT)
+    rows = floats_2(base, layout.directory(base), GAUGE_AT)
     form, on_piston = s.form, head.gauge_bar == GaugeBar.PISTON
     a_p, a_b = loads_of(par, s, bars.forms.stiff[form])
     own = np.zeros((2, rows.shape[0]))
@@ -223,7 +209,7 @@ def table_key(image, key):
 @preparing
 def _take_tables(base, like):
     """Let a motion use the tables of another one."""
-    mine, other = directory(base), directory(like)
+    mine, other = layout.directory(base), layout.directory(like)
     for k in range(ROOM_AT):
         mine[k] = other[k]
         mine[k, 0] += like - base
@@ -232,7 +218,7 @@ def _take_tables(base, like):
 @preparing
 def _enter_moving(base, n, n_p):
     """Enter the arrays of what moves."""
-    d = directory(base)
+    d = layout.directory(base)
     enter(d, W_AT, WORK, ROWS, n)
     enter(d, WP_AT, WORK + lines(8 * ROWS * n), PISTON_ROWS, n_p)
 
@@ -247,30 +233,30 @@ def _make(numbers, par, request, bar, place):
         gauge, above, area = gauge_rows(numbers, made, par[0].dt, bar, place)
     tables, room = _tables(made, gauge), (np.zeros((ROOM, max(n, 2 * SCAN))),)
     moving = WORK + lines(8 * ROWS * n) + lines(8 * PISTON_ROWS * n_p)
-    base, room_at, tables_at = make_memory(
+    base, room_at, tables_at = layout.make_memory(
         Kind.MODAL.value, PAR_BYTES, moving, table_bytes(room), table_bytes(tables)
     )
     if base != 0:
-        put_tables(base, directory(base), 0, tables_at, tables)
-        put_tables(base, directory(base), ROOM_AT, room_at, room)
+        put_tables(base, layout.directory(base), 0, tables_at, tables)
+        put_tables(base, layout.directory(base), ROOM_AT, room_at, room)
         _enter_moving(base, n, n_p)
-        set_gauge(base, bar, 0, above, 0.0, area)
+        layout.set_gauge(base, bar, 0, above, 0.0, area)
     return base
 
 
 @preparing
 def _make_like(like):
     """Make the memory of a motion that uses the tables of another one."""
-    other = directory(like)
+    other = layout.directory(like)
     n, n_p = other[W_AT, 2], other[WP_AT, 2]
     room = (np.zeros((ROOM, max(n, 2 * SCAN))),)
     moving = WORK + lines(8 * ROWS * n) + lines(8 * PISTON_ROWS * n_p)
-    base, room_at, _ = make_memory(Kind.MODAL.value, PAR_BYTES, moving, table_bytes(room), 0)
+    base, room_at, _ = layout.make_memory(Kind.MODAL.value, PAR_BYTES, moving, table_bytes(room), 0)
     if base != 0:
         _take_tables(base, like)
-        put_tables(base, directory(base), ROOM_AT, room_at, room)
+        put_tables(base, layout.directory(base), ROOM_AT, room_at, room)
         _enter_moving(base, n, n_p)
-        set_gauge(base, GaugeBar.NONE.value, 0, 0.0, 0.0, 1.0)
+        layout.set_gauge(base, GaugeBar.NONE.value, 0, 0.0, 0.0, 1.0)
     return base
 
 
@@ -296,8 +282,8 @@ def create(image, bar, place, like):
     base = _make_like(like) if like != 0 else _make(numbers, par, request, bar, place)
     if base != 0:
         parameters(base)[0] = par[0]
-        describe(base, ROWS_LISTED, (W_AT, 2), par[0].dt, 0.0)
-        at = base + head_records(base, 1)[0].state_at
+        layout.describe(base, ROWS_LISTED, (W_AT, 2), par[0].dt, 0.0)
+        at = base + layout.head_records(base, 1)[0].state_at
         bars = bars_in(base, at)
         begin(par[0], state_in(at)[0], bars.w, bars.forms.sizes[0], numbers)
     hold(par)
@@ -350,22 +336,21 @@ def run(base, moving, task, t, blows, room, events, event_room, events_on):
     state[0].events_on = events_on
     wanted = Task.ADVANCE.value if task == ADVANCE else Task.COMMIT.value
     return run_task(
-        wanted, parameters(base), state, bars_in(base, moving), t, blow_records(blows, room),
-        event_records(events, event_room), reading_of(base),
+        wanted, parameters(base), state, bars_in(base, moving), t, layout.blow_records(blows, room),
+        layout.event_records(events, event_room), layout.reading_of(base),
     )  # fmt: skip
 
 
 @preparing
 def read(base, moving, copy, t, reading, peaks):
     """Carry a copy of what moves to a time and read it; a `Status`."""
-    count = (head_records(base, 1)[0].state_bytes - RECORD) // 8
-    copy_words(moving + RECORD, copy + RECORD, count)
+    layout.copy_moving(base, moving, copy)
     state = state_in(copy)
     if peaks < 1:
         state[0].peak_from = math.inf
     return run_task(
-        Task.READ.value, parameters(base), state, bars_in(base, copy), t, blow_rows(base),
-        event_rows(base), reading_records(reading, 1),
+        Task.READ.value, parameters(base), state, bars_in(base, copy), t, layout.blow_rows(base),
+        layout.event_rows(base), layout.reading_records(reading, 1),
     )  # fmt: skip
 
 
@@ -378,7 +363,7 @@ def find_fault(base, moving, t, facts):
         return fault
     if not arrays_are_bounded(base, moving, W_AT, 2):
         return Fault.WORKSPACE.value
-    d = directory(base)
+    d = layout.directory(base)
     sizes, law_sizes = words_1(base, d, SIZES), words_1(base, d, LAW_SIZES)
     tick, s = parameters(base)[0].tick, state_in(moving)[0]
     number, told[0], told[1] = state_fault(s, sizes, law_sizes, tick, t)

@@ -43,26 +43,21 @@ ALLOWED = frozenset(
 )
 
 
-class Target(NamedTuple):
-    """A processor and system to make code for.
+class Build(NamedTuple):
+    """Code for a processor: its name and features for LLVM, and what names of entries end with."""
 
-    Attributes
-    ----------
-    triple : str
-        As LLVM and compilers call it.
-    cpu, features : str
-    suffix : str
-        Of the names of the entries.
-    """
-
-    triple: str
-    cpu: str = "generic"
-    features: str = ""
-    suffix: str = "_base"
+    cpu: str
+    features: str
+    suffix: str
 
 
 # Vectors of AVX2, but no sum and product in one: it would round otherwise.
 AVX2 = "+avx2,+bmi,+bmi2,-fma"
+# For each processor: on x86, the library chooses when it is loaded.
+BUILDS = {
+    "x86_64": (Build("x86-64", "", "_base"), Build("x86-64", AVX2, "_avx2")),
+    "aarch64": (Build("generic", "", "_base"),),
+}
 
 
 class Exported(NamedTuple):
@@ -276,13 +271,16 @@ def undefined(module: Any) -> set[str]:
     }
 
 
-def make_object(text: str, target: Target, names: Iterable[str]) -> bytes:
-    """Object code of the module for a target.
+def make_object(text: str, triple: str, build: Build, names: Iterable[str]) -> bytes:
+    """Object code of a module for a system.
 
     Parameters
     ----------
     text : str
         As `compile_entries` gives it.
+    triple : str
+        The system, as LLVM and compilers call it.
+    build : Build
     names : iterable of str
         Entries.
 
@@ -293,15 +291,15 @@ def make_object(text: str, target: Target, names: Iterable[str]) -> bytes:
     """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    machine = llvm.Target.from_triple(target.triple).create_target_machine(
-        cpu=target.cpu, features=target.features, opt=3, reloc="pic", codemodel="default"
+    machine = llvm.Target.from_triple(triple).create_target_machine(
+        cpu=build.cpu, features=build.features, opt=3, reloc="pic", codemodel="default"
     )
     module = llvm.parse_assembly(text)
-    module.triple, module.data_layout = target.triple, str(machine.target_data)
+    module.triple, module.data_layout = triple, str(machine.target_data)
     kept = set(names)
     for one in module.functions:
         if one.name in kept or (one.is_declaration and is_solvers(one.name)):
-            one.name += target.suffix
+            one.name += build.suffix
             one.visibility = "hidden" if one.is_declaration else "default"
         elif not one.is_declaration:
             one.linkage = "internal"
@@ -313,35 +311,19 @@ def make_object(text: str, target: Target, names: Iterable[str]) -> bytes:
     builder.getModulePassManager().run(module, builder)
     missing = {one for one in undefined(module) - ALLOWED if not is_solvers(plain_name(one))}
     if missing:
-        raise ValueError(f"left undefined for {target.triple}: {', '.join(sorted(missing))}")
+        raise ValueError(f"left undefined for {triple}: {', '.join(sorted(missing))}")
     if baked := re.search(r"inttoptr \(i64 [0-9]{6,}", str(module)):
         raise ValueError(f"an address of this process is in the code: {baked.group()}")
     code: bytes = machine.emit_object(module)
     return code
 
 
-# Builds for each processor: on x86, the library chooses when it is loaded.
-BUILDS = {
-    "x86_64": (("x86-64", "", "_base"), ("x86-64", AVX2, "_avx2")),
-    "aarch64": (("generic", "", "_base"),),
-}
-
-
 def write_objects(text: str, names: Iterable[str], platform: str, folder: Path) -> list[Path]:
-    """Write the objects of a module for a platform, `<platform>_<build>.o`, into a folder.
-
-    Parameters
-    ----------
-    text : str
-        As `compile_entries` gives it.
-    names : iterable of str
-        Entries.
-    """
+    """Write the objects of a module for a platform, `<platform>_<build>.o`; as `make_object`."""
     files = []
-    for cpu, features, suffix in BUILDS[platform.partition("-")[0]]:
-        target = Target(PLATFORMS[platform].triple, cpu, features, suffix)
-        files.append(folder / f"{platform}{suffix}.o")
-        files[-1].write_bytes(make_object(text, target, names))
+    for build in BUILDS[platform.partition("-")[0]]:
+        files.append(folder / f"{platform}{build.suffix}.o")
+        files[-1].write_bytes(make_object(text, PLATFORMS[platform].triple, build, names))
     return files
 
 

@@ -35,9 +35,7 @@ class Kind(IntEnum):
 
 
 # By the names of solvers.
-KINDS = {
-    "modal": Kind.MODAL, "wave": Kind.WAVE, "fem": Kind.FEM, "rigid": Kind.RIGID,
-}  # fmt: skip
+KINDS = {kind.name.lower(): kind for kind in Kind}
 
 
 class GaugeBar(IntEnum):

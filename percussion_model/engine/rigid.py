@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
+from percussion_model.engine import layout
 from percussion_model.engine.checks import record_fault
 from percussion_model.engine.defaults import shape_form, shapes, table_key  # noqa: F401  # entries
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import new_values, numbers_in
-from percussion_model.engine.layout import (
-    blow_records,
-    blow_rows,
-    copy_words,
-    describe,
-    event_records,
-    event_rows,
-    head_records,
-    make_memory,
-    reading_records,
-    views_of,
-)
 from percussion_model.engine.memory import floats_at, hold
-from percussion_model.engine.records import ADVANCE, RECORD, Kind, work_at
+from percussion_model.engine.records import ADVANCE, Kind, work_at
 from percussion_model.engine.sampling import sampler
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Status
@@ -28,7 +17,7 @@ from percussion_model.solvers.rigid.prepare import begin, fill_rigid_parameters
 from percussion_model.solvers.rigid.records import RIGID_LIMITS, RIGID_PAR, RIGID_STATE
 from percussion_model.solvers.state import words_of
 
-parameters, state_in = views_of(RIGID_PAR, RIGID_STATE)
+parameters, state_in = layout.views_of(RIGID_PAR, RIGID_STATE)
 LOW, HIGH, MAY_BE_NAN, WHOLE = RIGID_LIMITS.rows
 PAR_BYTES, MOVING = RIGID_PAR.itemsize, work_at(RIGID_STATE)
 ROWS_LISTED = tuple(words_of(RIGID_STATE)[name] for name in ("n_blows", "n_events"))
@@ -43,14 +32,14 @@ def refuse(image, facts):
 @preparing
 def create(image, bar, place, like):
     """Make the memory of a motion at time zero; its address, 0 where there is no memory left."""
-    base = make_memory(Kind.RIGID.value, PAR_BYTES, MOVING, 0, 0)[0]
+    base = layout.make_memory(Kind.RIGID.value, PAR_BYTES, MOVING, 0, 0)[0]
     if base == 0:
         return base
     values = new_values()
     numbers = numbers_in(image, values)
     fill_rigid_parameters(parameters(base)[0], numbers)
-    describe(base, ROWS_LISTED, (0, 0), 0.0, 0.0)
-    at = base + head_records(base, 1)[0].state_at
+    layout.describe(base, ROWS_LISTED, (0, 0), 0.0, 0.0)
+    at = base + layout.head_records(base, 1)[0].state_at
     begin(parameters(base)[0], state_in(at)[0], numbers)
     hold(values)
     return base
@@ -98,18 +87,18 @@ def run(base, moving, task, t, blows, room, events, event_room, events_on):
         return Status.DONE.value
     state[0].events_on = events_on
     return kernels.advance(
-        parameters(base), state, t, blow_records(blows, room), event_records(events, event_room)
-    )
+        parameters(base), state, t, layout.blow_records(blows, room),
+        layout.event_records(events, event_room),
+    )  # fmt: skip
 
 
 @preparing
 def read(base, moving, copy, t, reading, peaks):
     """Carry a copy of what moves to a time and read it; a `Status`."""
-    count = (head_records(base, 1)[0].state_bytes - RECORD) // 8
-    copy_words(moving + RECORD, copy + RECORD, count)
+    layout.copy_moving(base, moving, copy)
     return kernels.read(
-        parameters(base), state_in(copy), t, blow_rows(base), event_rows(base),
-        reading_records(reading, 1),
+        parameters(base), state_in(copy), t, layout.blow_rows(base), layout.event_rows(base),
+        layout.reading_records(reading, 1),
     )  # fmt: skip
 
 

@@ -240,23 +240,19 @@ class EngineSolver(Solver):
 
     def time(self, state: State) -> float:
         """Time up to which the state is committed [s]."""
-        found: float = self._entries.state_time(self._base, state.address)
-        return found
+        return float(self._entries.state_time(self._base, state.address))
 
     def grid_point_after(self, state: State, t: float) -> float:
         """First time at or after `t` at which inputs can change [s]."""
-        found: float = self._entries.grid_point_after(self._base, state.address, t)
-        return found
+        return float(self._entries.grid_point_after(self._base, state.address, t))
 
     def readable_until(self, state: State) -> float:
         """Time up to which `read` answers without advancing the state far [s]."""
-        found: float = self._entries.readable_until(self._base, state.address)
-        return found
+        return float(self._entries.readable_until(self._base, state.address))
 
     def time_of_blow(self, state: State) -> float:
         """As in `Solver`."""
-        found: float = self._entries.time_of_blow(self._base, state.address)
-        return found
+        return float(self._entries.time_of_blow(self._base, state.address))
 
     def state_fault(self, state: State, t: float) -> str:
         """What is wrong with a state that comes from outside, of time `t` [s]; empty: nothing."""

@@ -4,25 +4,11 @@ from __future__ import annotations
 
 import math
 
-from percussion_model.engine.checks import arrays_are_bounded, record_fault
+from percussion_model.engine import layout
+from percussion_model.engine.checks import arrays_are_bounded, record_fault, time_fault
 from percussion_model.engine.defaults import shape_form, shapes, table_key  # noqa: F401  # entries
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import gauge_sections, new_values, numbers_in
-from percussion_model.engine.layout import (
-    blow_records,
-    blow_rows,
-    copy_words,
-    describe,
-    directory,
-    event_records,
-    event_rows,
-    head_records,
-    make_memory,
-    reading_of,
-    reading_records,
-    set_gauge,
-    views_of,
-)
 from percussion_model.engine.memory import (
     enter,
     floats_2,
@@ -61,7 +47,7 @@ from percussion_model.solvers.wave.records import (
 )
 from percussion_model.solvers.wave.sections import CAME_ROWS, cell_masses, fill_cells, force_in
 
-parameters, state_in = views_of(WAVE_PAR, WAVE_STATE)
+parameters, state_in = layout.views_of(WAVE_PAR, WAVE_STATE)
 new_parameters = new_record(WAVE_PAR)
 LOW, HIGH, MAY_BE_NAN, WHOLE = WAVE_LIMITS.rows
 PAR_BYTES = WAVE_PAR.itemsize
@@ -69,15 +55,13 @@ WORK = work_at(WAVE_STATE)  # place of the first array in what moves
 ROWS_LISTED = tuple(words_of(WAVE_STATE)[name] for name in ("n_blows", "n_events"))
 BAR_ROWS, JOINT_ROWS = len(Bar), len(Has)
 CELLS, GIVEN = Place.CELLS.value, Bar.GIVEN.value
-# A state is no more than a step, and rounding, behind the present [steps].
-MOST_BEHIND = 2.0
 PLACES, STEEL, WEIGHTS, PASSAGE, FITS, BODIES, BARS, JOINTS, CAME, RINGS = range(10)
 
 
 @viewing
 def chain_of(base):
     """`Chain` of a motion."""
-    d = directory(base)
+    d = layout.directory(base)
     return Chain(
         words_2(base, d, PLACES), floats_2(base, d, STEEL), floats_2(base, d, WEIGHTS),
         floats_2(base, d, PASSAGE), floats_2(base, d, FITS), floats_2(base, d, BODIES),
@@ -87,7 +71,7 @@ def chain_of(base):
 @viewing
 def waves_in(base, moving, own):
     """`Waves` of what moves with its rings, and the rest of it or of a copy, at an address."""
-    d = directory(base)
+    d = layout.directory(base)
     return Waves(
         floats_2(moving, d, RINGS), floats_2(own, d, BARS), floats_2(own, d, JOINTS),
         floats_2(own, d, CAME),
@@ -134,22 +118,24 @@ def _make(numbers, bar, place):
     came_at = joints_at + lines(8 * JOINT_ROWS * joints)
     rings_at = came_at + lines(8 * CAME_ROWS * came)
     moving = rings_at + lines(8 * network.rings)
-    base, _, tables_at = make_memory(Kind.WAVE.value, PAR_BYTES, moving, 0, table_bytes(arrays))
+    base, _, tables_at = layout.make_memory(
+        Kind.WAVE.value, PAR_BYTES, moving, 0, table_bytes(arrays)
+    )
     if base == 0:
         return base
-    d = directory(base)
+    d = layout.directory(base)
     put_tables(base, d, 0, tables_at, arrays)
     enter(d, BARS, WORK, BAR_ROWS, bars)
     enter(d, JOINTS, joints_at, JOINT_ROWS, joints)
     enter(d, CAME, came_at, CAME_ROWS, came)
     enter(d, RINGS, rings_at, 1, network.rings)
     parameters(base)[0] = par[0]
-    describe(base, ROWS_LISTED, (BARS, 4), plan.time_step, network.misfit)
+    layout.describe(base, ROWS_LISTED, (BARS, 4), plan.time_step, network.misfit)
     hold(par)
     if bar != GaugeBar.NONE:
         which = _which(bar, network.struck, bars)
         cell, area = find_cell(gauge_sections(numbers, bar), cell_masses(chain, which), place)
-        set_gauge(base, bar, cell, 0.0, 0.0, area)
+        layout.set_gauge(base, bar, cell, 0.0, 0.0, area)
     return base
 
 
@@ -160,7 +146,7 @@ def create(image, bar, place, like):
     numbers = numbers_in(image, values)
     base = _make(numbers, bar, place)
     if base != 0:
-        at = base + head_records(base, 1)[0].state_at
+        at = base + layout.head_records(base, 1)[0].state_at
         begin(parameters(base)[0], state_in(at)[0], chain_of(base), waves_in(base, at, at), numbers)
     hold(values)
     return base
@@ -207,8 +193,8 @@ def run(base, moving, task, t, blows, room, events, event_room, events_on):
     state[0].events_on = events_on
     return run_task(
         Task.ADVANCE.value, parameters(base), state, chain_of(base),
-        waves_in(base, moving, moving), t, blow_records(blows, room),
-        event_records(events, event_room), reading_of(base),
+        waves_in(base, moving, moving), t, layout.blow_records(blows, room),
+        layout.event_records(events, event_room), layout.reading_of(base),
     )  # fmt: skip
 
 
@@ -218,22 +204,22 @@ def read(base, moving, copy, t, reading, peaks):
 
     The rings, far larger than the rest, are left alone, and are not copied.
     """
-    count = (directory(base)[RINGS, 0] - RECORD) // 8
-    copy_words(moving + RECORD, copy + RECORD, count)
+    count = (layout.directory(base)[RINGS, 0] - RECORD) // 8
+    layout.copy_words(moving + RECORD, copy + RECORD, count)
     state = state_in(copy)
     if peaks < 1:
         state[0].peak_from = math.inf
     task = Task.READ.value if peaks >= 0 else Task.SAMPLE.value
     return run_task(
         task, parameters(base), state, chain_of(base), waves_in(base, moving, copy), t,
-        blow_rows(base), event_rows(base), reading_records(reading, 1),
+        layout.blow_rows(base), layout.event_rows(base), layout.reading_records(reading, 1),
     )  # fmt: skip
 
 
 @preparing
 def stress(base, moving):
     """Stress at the gauge in what moves [Pa]."""
-    head, chain = head_records(base, 1)[0], chain_of(base)
+    head, chain = layout.head_records(base, 1)[0], chain_of(base)
     bar = _which(head.gauge_bar, parameters(base)[0].struck, len(chain.bodies))
     rings, step = waves_in(base, moving, moving).rings, state_in(moving)[0].step
     return force_in(chain, rings, step, bar, head.gauge_cell) / head.gauge_area
@@ -248,8 +234,7 @@ def find_fault(base, moving, t, facts):
         return fault
     if not arrays_are_bounded(base, moving, BARS, 4):
         return Fault.WORKSPACE.value
-    told[0], told[1] = state_time(base, moving), t
-    return 0 if told[0] >= t - MOST_BEHIND * parameters(base)[0].dt else Fault.BEHIND.value
+    return time_fault(state_time(base, moving), t, parameters(base)[0].dt, told)
 
 
 @preparing
