@@ -31,11 +31,17 @@ static const uint8_t MAGIC[8] = {'P', 'H', 'A', 'M', 'M', 'E', 'R', 0};
 enum {
     FORMAT = 3, /* 1 and 2 are those of FMUs in Python */
     VERSION_AT = 8, OWNER_AT = 12, LENGTH_AT = OWNER_AT + DIGEST, HASH_AT = LENGTH_AT + 8,
-    BODY_AT = HASH_AT + DIGEST,
-    /* of the body: phase, flags, start, now, stop */
-    PLACE_SIZE = 32
+    BODY_AT = HASH_AT + DIGEST
 };
 enum { IS_SET_UP = 1, HAS_STOP = 2 };
+
+/* The body begins with the place. Numbers lie in the bytes as in memory: only little endian
+ * processors run this. */
+typedef struct {
+    uint8_t phase, flags, unused[6];
+    double start, now, stop;
+} SavedPlace;
+_Static_assert(sizeof(SavedPlace) == 32, "the place has no gaps");
 
 static size_t value_count(const Instance *one) {
     return (size_t)one->tables.variable_count + one->tables.input_count;
@@ -161,6 +167,16 @@ static void find_owner(Instance *one, Phase phase, uint8_t digest[DIGEST]) {
     memcpy(digest, one->fingerprint, DIGEST);
 }
 
+static bool belongs_here(Instance *one, const State *state) {
+    uint8_t owner[DIGEST];
+    find_owner(one, state->place.phase, owner);
+    if (memcmp(owner, state->belongs_to, DIGEST) != 0) {
+        refuse(one, "the saved state belongs to other parameters or to another FMU");
+        return false;
+    }
+    return true;
+}
+
 /* What was read of a state is no part of it. */
 static void forget_reading(int64_t *motion, size_t size) {
     if (size >= sizeof *motion) {
@@ -279,7 +295,6 @@ static void take_values(Instance *one, State *state) {
 }
 
 Status set_state(Instance *one, void *block) {
-    uint8_t owner[DIGEST];
     State *state = readable(one, block);
     if (state == NULL) {
         return REFUSED;
@@ -287,9 +302,8 @@ Status set_state(Instance *one, void *block) {
     if (one->place.phase == UPDATING) {
         return refuse(one, "call out of order: no state can be restored within a step");
     }
-    find_owner(one, state->place.phase, owner);
-    if (memcmp(owner, state->belongs_to, DIGEST) != 0) {
-        return refuse(one, "the saved state belongs to other parameters or to another FMU");
+    if (!belongs_here(one, state)) {
+        return REFUSED;
     }
     if (state->place.phase >= STEPPING) {
         int64_t *motion;
@@ -310,27 +324,12 @@ Status set_state(Instance *one, void *block) {
 
 /* ---- bytes ------------------------------------------------------------------------ */
 
-static void put(uint8_t *bytes, uint64_t value, size_t count) {
-    for (size_t k = 0; k < count; k++) {
-        bytes[k] = (uint8_t)(value >> (8 * k));
-    }
-}
+static void put(uint8_t *bytes, uint64_t value, size_t count) { memcpy(bytes, &value, count); }
 
 static uint64_t taken(const uint8_t *bytes, size_t count) {
     uint64_t value = 0;
-    for (size_t k = 0; k < count; k++) {
-        value |= (uint64_t)bytes[k] << (8 * k);
-    }
+    memcpy(&value, bytes, count);
     return value;
-}
-
-/* Numbers lie in the bytes as in memory: only little endian processors run this. */
-static void put_time(uint8_t *bytes, double time) { memcpy(bytes, &time, sizeof time); }
-
-static double time_at(const uint8_t *bytes) {
-    double time;
-    memcpy(&time, bytes, sizeof time);
-    return time;
 }
 
 /* Hash of the head before it, and of the body. */
@@ -343,22 +342,14 @@ static void find_hash(const uint8_t *bytes, size_t size, uint8_t digest[DIGEST])
 }
 
 static size_t size_of(const Instance *one, const State *state) {
-    return BODY_AT + PLACE_SIZE + value_count(one) * sizeof(double) + state->motion_size;
+    return BODY_AT + sizeof(SavedPlace) + value_count(one) * sizeof(double) + state->motion_size;
 }
 
 /* A state that belongs to this FMU: others have another number of values. */
 static State *readable_here(Instance *one, void *block) {
-    uint8_t owner[DIGEST];
     State *state = readable(one, block);
-    if (state == NULL || is_mine(one, state)) {
-        return state;
-    }
-    find_owner(one, state->place.phase, owner);
-    if (memcmp(owner, state->belongs_to, DIGEST) != 0) {
-        refuse(one, "the saved state belongs to other parameters or to another FMU");
-        return NULL;
-    }
-    return state;
+    bool is_good = state != NULL && (is_mine(one, state) || belongs_here(one, state));
+    return is_good ? state : NULL;
 }
 
 Status state_size(Instance *one, void *block, size_t *size) {
@@ -388,14 +379,13 @@ Status state_to_bytes(Instance *one, void *block, uint8_t *bytes, size_t size) {
     put(bytes + VERSION_AT, FORMAT, 4);
     memcpy(bytes + OWNER_AT, state->belongs_to, DIGEST);
     put(bytes + LENGTH_AT, needed - BODY_AT, 8);
-    uint8_t *body = bytes + BODY_AT;
-    memset(body, 0, PLACE_SIZE);
-    body[0] = (uint8_t)place->phase;
-    body[1] = (uint8_t)((place->is_set_up ? IS_SET_UP : 0) | (place->has_stop ? HAS_STOP : 0));
-    put_time(body + 8, place->start);
-    put_time(body + 16, place->now);
-    put_time(body + 24, place->stop);
-    memcpy(body + PLACE_SIZE, state->words, needed - BODY_AT - PLACE_SIZE);
+    SavedPlace saved = {
+        .phase = (uint8_t)place->phase,
+        .flags = (uint8_t)((place->is_set_up ? IS_SET_UP : 0) | (place->has_stop ? HAS_STOP : 0)),
+        .start = place->start, .now = place->now, .stop = place->stop,
+    };
+    memcpy(bytes + BODY_AT, &saved, sizeof saved);
+    memcpy(bytes + BODY_AT + sizeof saved, state->words, needed - BODY_AT - sizeof saved);
     find_hash(bytes, needed, bytes + HASH_AT);
     return DONE;
 }
@@ -426,13 +416,14 @@ static Status check_head(Instance *one, const uint8_t *bytes, size_t size) {
 }
 
 static Status read_place(Instance *one, const uint8_t *body, Place *place) {
-    uint8_t phase = body[0], flags = body[1];
-    double start = time_at(body + 8), now = time_at(body + 16), stop = time_at(body + 24);
-    bool is_set_up = (flags & IS_SET_UP) != 0, has_stop = (flags & HAS_STOP) != 0;
-    if (phase >= UPDATING || (flags & ~(IS_SET_UP | HAS_STOP)) != 0 ||
-        (!is_set_up && (phase > INSTANTIATED || has_stop))) {
-        return refuse(one, "the saved state is in phase %u, set up: %u", (uint64_t)phase,
-                      (uint64_t)flags);
+    SavedPlace saved;
+    memcpy(&saved, body, sizeof saved);
+    double start = saved.start, now = saved.now, stop = saved.stop;
+    bool is_set_up = (saved.flags & IS_SET_UP) != 0, has_stop = (saved.flags & HAS_STOP) != 0;
+    if (saved.phase >= UPDATING || (saved.flags & ~(IS_SET_UP | HAS_STOP)) != 0 ||
+        (!is_set_up && (saved.phase > INSTANTIATED || has_stop))) {
+        return refuse(one, "the saved state is in phase %u, set up: %u", (uint64_t)saved.phase,
+                      (uint64_t)saved.flags);
     }
     if (!(isfinite(start) && isfinite(now) && now >= start)) {
         return refuse(one, "the saved state has the time %r s after a start at %r s", now, start);
@@ -441,7 +432,7 @@ static Status read_place(Instance *one, const uint8_t *body, Place *place) {
         return refuse(one, "the saved state has a stop at %r s after a start at %r s", stop,
                       start);
     }
-    *place = (Place){(Phase)phase, is_set_up, has_stop, start, now, has_stop ? stop : 0.0};
+    *place = (Place){(Phase)saved.phase, is_set_up, has_stop, start, now, has_stop ? stop : 0.0};
     return DONE;
 }
 
@@ -465,7 +456,7 @@ static Status check_types(Instance *one, State *state) {
 static Status check_parts(Instance *one, const uint8_t *bytes, State *state) {
     const uint8_t *body = bytes + BODY_AT;
     memcpy(state->belongs_to, bytes + OWNER_AT, DIGEST);
-    memcpy(state->words, body + PLACE_SIZE,
+    memcpy(state->words, body + sizeof(SavedPlace),
            value_count(one) * sizeof(double) + state->motion_size);
     state->is_own = false;
     forget_reading(motion_of(one, state), state->motion_size);
@@ -486,8 +477,8 @@ Status state_from_bytes(Instance *one, const uint8_t *bytes, size_t size, void *
     if (status != DONE) {
         return status;
     }
-    size_t body = size - BODY_AT, least = PLACE_SIZE + value_count(one) * sizeof(double);
-    if (body < PLACE_SIZE) {
+    size_t body = size - BODY_AT, least = sizeof(SavedPlace) + value_count(one) * sizeof(double);
+    if (body < sizeof(SavedPlace)) {
         return refuse(one, "the saved state has %u bytes, too few for a time", (uint64_t)body);
     }
     if (body < least) {
