@@ -197,11 +197,7 @@ class _Writer:
         lower, upper = _bounds(one)
         choices = _numbers(one)
         first, self.choices = len(self.choices), [*self.choices, *choices]
-        conversion, place = NOWHERE, 0
-        if is_output:
-            place = next(outputs)
-        else:
-            conversion, place = self._word(one)
+        conversion, place = (NOWHERE, next(outputs)) if is_output else self._word(one)
         return VARIABLE.pack(
             one.reference, self._place(one.name), TYPES[one.type], CAUSALITIES[one.causality],
             conversion, place,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
@@ -83,16 +83,9 @@ def read_plan(path: Path, **changes: Any) -> SystemPlan:
     except (TypeError, AttributeError):
         raise SystemPlanError(f"{path}: a table stands where its base has a value") from None
     _check_entries(path, found)
-    return SystemPlan(
-        name=found["name"],
-        description=found["description"],
-        hammer=_beside(path, found["hammer"]) or scene_file(Path(found["hammer"])),
-        duration=float(found["duration"]),
-        step=float(found["step"]),
-        components=found["components"],
-        connections=found["connections"],
-        parameters=found["parameters"],
-    )
+    found["hammer"] = _beside(path, found["hammer"]) or scene_file(Path(found["hammer"]))
+    found |= {key: float(found[key]) for key in ("duration", "step")}
+    return SystemPlan(**{one.name: found[one.name] for one in fields(SystemPlan)})
 
 
 def _check_entries(path: Path, found: dict[str, Any]) -> None:

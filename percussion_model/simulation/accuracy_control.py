@@ -163,8 +163,6 @@ def has_grid(scene: Scene) -> bool:
 
 def planned_cells(scene: Scene) -> list[int]:
     """Steps, or modes, of the runs of a request: to compare with, by rule, to verify."""
-    wanted = scene.solver.accuracy
-    assert wanted is not None
     plan = _first_grids(scene)
     if scene.run.check:
         finer = _finer_grid(scene, plan[-1])

@@ -12,7 +12,7 @@ from bokeh.layouts import column
 from bokeh.layouts import row as side_by_side
 from bokeh.models import Checkbox, Div, LayoutDOM, Select, Slider, TextInput
 
-from percussion_model.scene.parameters import GROUPS, find_row
+from percussion_model.scene.parameters import GROUPS
 from percussion_model.scene.rows import ParameterRow, SceneError, shortened
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_setting
@@ -236,5 +236,4 @@ def keys_of(scene: Scene) -> Iterator[str]:
 
 def switch_keys() -> list[str]:
     """Keys that have a switch or a choice."""
-    names = [name for name in GROUPS["effects"].rows if name not in _OF_STRINGS]
-    return [f"effects.{name}" for name in names if find_row(f"effects.{name}") is not None]
+    return [f"effects.{name}" for name in GROUPS["effects"].rows if name not in _OF_STRINGS]
