@@ -86,8 +86,8 @@ def sources_of(module: str) -> tuple[Path, ...]:
         if file is None or file in found:
             continue
         found.add(file)
-        if file == PACKAGE / "components" / "__init__.py":
-            found |= set(file.parent.glob("*.py"))
+        if file == PACKAGE / "components" / "__init__.py":  # which imports them by their names
+            todo += [f"{NAME}.components.{one.stem}" for one in file.parent.glob("*.py")]
         for name in _imported_by(file):
             if name not in seen:
                 seen.add(name)

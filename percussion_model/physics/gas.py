@@ -20,8 +20,12 @@ HEAT = AIR * RATIO / (RATIO - 1.0)
 # Flow below this ratio of pressures is choked, and has the flow function of this ratio.
 CRITICAL = (2.0 / (RATIO + 1.0)) ** (RATIO / (RATIO - 1.0))
 CHOKED = math.sqrt(RATIO) * (2.0 / (RATIO + 1.0)) ** (0.5 * (RATIO + 1.0) / (RATIO - 1.0))
+# Pressures that differ by less than this share are equal.
+EQUAL = 1e-9
 # Above this ratio the flow function goes straight to zero: its root would have no slope there.
-STRAIGHT = 0.999
+# By 0.999 velocities of impact are others by 3e-5, and gas near the outer pressure takes twice the
+# time.
+STRAIGHT = 0.995
 # r^(2/7) by powers of (r - MIDDLE)/HALF: Chebyshev's series, to 1e-12 from CRITICAL to 1.
 MIDDLE, HALF = 0.76, 0.24
 SERIES = (
@@ -113,7 +117,9 @@ def flow(one, other, area):
 def stiffness(flow, one, other):
     """Bound of what a flow changes in either volume by its pressure in a second [m^3/s].
 
-    By the secant to equal pressures, which is steeper than the flow function.
+    By the secant to equal pressures, which is straight near them and twice as steep as the flow
+    function elsewhere.
     """
     high, low = max(one.pressure, other.pressure), min(one.pressure, other.pressure)
-    return (RATIO - 1.0) * abs(flow.energy) / max(high - low, (1.0 - STRAIGHT) * high)
+    steep = 1.0 if low > STRAIGHT * high else 0.5
+    return steep * (RATIO - 1.0) * abs(flow.energy) / max(high - low, EQUAL * high)

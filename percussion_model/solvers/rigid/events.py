@@ -12,7 +12,7 @@ from percussion_model.physics.blows import (
     starts_blow,
 )
 from percussion_model.physics.kernel import kernel
-from percussion_model.physics.loads import room_to_turn, turn_drive
+from percussion_model.physics.loads import bend_of, room_to_turn, turn_drive
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.physics.rock import (
     close_interface,
@@ -176,6 +176,9 @@ def process_event(par, s, blows, events):
         s.p = s.line_end
         take_line(par, s)
     elif kind == Next.HOLD:
+        if s.held == 0:
+            s.gap -= bend_of(par, s, s.next_tau, s.next_tau)
+            s.u_r = -s.gap
         note_standstill_force(par, s)
         mark_standstill(s)
     else:

@@ -8,6 +8,7 @@ from percussion_model.physics.kernel import kernel
 from percussion_model.physics.loads import (
     drive_force,
     hold_components,
+    lasting,
     piston_acceleration,
     room_to_turn,
 )
@@ -217,16 +218,17 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
     s.closed = s.held
-    hold_components(par, s, par.window)
-    find_next(par, s)
-    if par.effects == 1 and 0.0 < s.next_tau < par.window:
+    longest = min(par.window, lasting(par, s)) if par.effects == 1 else NEVER
+    hold_components(par, s, longest)
+    find_next(par, s, longest)
+    if 0.0 < s.next_tau < longest < NEVER:
         hold_components(par, s, s.next_tau)
-        find_next(par, s)
+        find_next(par, s, longest)
 
 
 @kernel
-def find_next(par, s):
-    """Find the next event under the forces that are held."""
+def find_next(par, s, longest):
+    """Find the next event under the forces that are held, for a time at most [s]."""
     F, M = loads(par, s)
     K, C, P = rock_terms(par, s)
     acc = acceleration(par, s)
@@ -257,8 +259,8 @@ def find_next(par, s):
     tau = later
     if par.piston != Piston.ABSENT:
         tau, kind = piston_event(par, s, y, acc, beta, k, tau, kind)
-    if par.effects == 1 and tau > par.window:
-        tau = par.window
+    if tau > longest:
+        tau = longest
         kind = Next.HOLD
     s.next_tau = tau
     s.next_time = s.time + tau
