@@ -54,16 +54,17 @@ DTYPE = np.dtype(
 def strike(pars, supply, out):
     """Let a piston strike from rest; rows are time, velocity, air, and stroke of a blow."""
     par, n, t, begun, most = pars[0], 0, 0.0, 0.0, 0.0
-    y = gas.started(open_air(par, 0.0), 1e-3, 0.0)
+    hole = par.pneumatic_ambient_pressure
+    y = gas.started(open_air(par, hole, 0.0), 1e-3, 0.0)
     while n < out.shape[0] and t - begun < 0.15:
         span = par.pneumatic_step
-        z = gas.go(par, supply, y, gas.flight(span))
+        z = gas.go(par, supply, hole, y, gas.flight(span))
         if z.x < 0.0:
             for _ in range(4):
                 if z.v >= 0.0:
                     return n
                 span = min(max(span - z.x / z.v, 1e-7), par.pneumatic_step)
-                z = gas.go(par, supply, y, gas.flight(span))
+                z = gas.go(par, supply, hole, y, gas.flight(span))
             begun = t + span
             out[n, 0], out[n, 1], out[n, 2], out[n, 3] = begun, -z.v, z.done.used, most
             n, most = n + 1, 0.0

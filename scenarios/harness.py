@@ -6,7 +6,6 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from . import results
 from .drawing import in_style, stacked
 from .results import Archive, ScenarioError
 
+HAMMER = results.DIST / "PercussiveHammer.fmu"
 # A constant, or a function of time.
 Signal = float | bool | Callable[[float], float | bool]
 # "quantity [unit]", its factor, and names of the columns in a panel.
@@ -213,7 +213,6 @@ def command_line(
     simulate: Callable[..., dict[str, np.ndarray]],
     title: str,
     panels: Sequence[Panel],
-    *drives: Archive,
 ) -> None:
     """Run a scenario of the hammer by `python -m scenarios.NAME`, and plot it.
 
@@ -225,23 +224,21 @@ def command_line(
             return [plot(folder / f"{name}.png", title, simulate(*paths), panels)]
 
     about = sys.modules[simulate.__module__].__doc__
-    results.command_line(name, about, (fmu("HAMMER.fmu"), *drives), work)
+    results.command_line(name, about, (fmu("HAMMER.fmu"),), work)
 
 
-def fmu(metavar: str, name: str = "PercussiveHammer") -> Archive:
-    """An FMU; that of `dist`, built if it is not there, where none is named."""
-    path = results.DIST / f"{name}.fmu"
-    return Archive(metavar, path, "modelDescription.xml", partial(built, name))
+def fmu(metavar: str) -> Archive:
+    """The hammer's FMU; that of `dist`, built if it is not there, where none is named."""
+    return Archive(metavar, HAMMER, "modelDescription.xml", built)
 
 
-def built(name: str = "PercussiveHammer") -> Path:
-    """An FMU of `dist`, built now if it is not there."""
-    path = results.DIST / f"{name}.fmu"
-    if not path.exists():
-        from fmu_src.commands.fmu import write_drive, write_hammer
+def built() -> Path:
+    """The hammer's FMU of `dist`, built now if it is not there."""
+    if not HAMMER.exists():
+        from fmu_src.commands.fmu import write_hammer
 
-        (write_hammer if name == "PercussiveHammer" else write_drive)(output=path)
-    return path
+        write_hammer(output=HAMMER)
+    return HAMMER
 
 
 def ramp(*points: tuple[float, float]) -> Callable[[float], float]:

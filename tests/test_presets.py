@@ -96,6 +96,11 @@ def test_a_file_that_is_not_there_is_no_preset(capsys):
 
 
 def test_systems_have_names_too():
-    assert set(system_presets()) == {"extremum_seeking", "feed_control", "two_way_seeking"}
+    assert set(system_presets()) == {
+        "air_drilling",
+        "extremum_seeking",
+        "feed_control",
+        "two_way_seeking",
+    }
     assert all(system_file(path.relative_to(path.parent).with_suffix("")) == path
                for path in system_presets().values())  # fmt: skip

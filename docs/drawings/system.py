@@ -68,7 +68,7 @@ ROUTES = {
     ("string", "rig"): Route(((5.9, 5.9), (3.6, 5.9)), (4.75, 6.15), "center"),
     ("string", "hammer"): Route(((8.2, 4.9), (10.2, 4.9)), (9.2, 4.65), "center"),
     ("hammer", "string"): Route(((10.2, 5.7), (8.2, 5.7)), (9.2, 5.95), "center"),
-    ("supply", "hammer"): Route(((15.4, 4.9), (13.2, 4.9)), (14.3, 4.65), "center"),
+    ("supply", "hammer"): Route(((15.4, 4.9), (13.2, 4.9)), (14.3, 4.29), "center"),
     ("hammer", "supply"): Route(((13.2, 5.9), (15.4, 5.9)), (14.3, 6.15), "center"),
     ("string", "rock"): Route(((7.0, LOW), (7.0, 8.5)), (6.85, 7.5), "right"),
     ("hammer", "rock"): Route(((11.0, LOW), (11.0, 8.5)), (10.85, 7.5), "right"),

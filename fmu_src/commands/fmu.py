@@ -10,8 +10,6 @@ import typer
 from fmu_src.commands import options
 from percussion_model.interface.commands import common
 
-DRIVE = "PneumaticDrive.fmu"
-
 
 def fmu(
     scene: options.Baked = None,
@@ -32,9 +30,6 @@ def fmu(
             help="Bring native libraries for linux64,win64 along; left out: for this one.",
         ),
     ] = None,
-    pneumatics: Annotated[
-        bool, typer.Option("--pneumatics", help="Write the simple pneumatic drive instead.")
-    ] = False,
     no_reference: Annotated[
         bool, typer.Option("--no-reference", help="Do not run it for _in.csv and _ref.csv.")
     ] = False,
@@ -49,9 +44,6 @@ def fmu(
     Its reference signals go beside it.
     """
     with common.needing("fmu"), options.refusing_faults():
-        if pneumatics:
-            write_drive(output, flat_names)
-            return
         path = write_hammer(scene, output, platforms, force, scene_option, rock, flat_names, bit)
         if no_reference:
             return
@@ -93,20 +85,6 @@ def write_hammer(
         guid = build_hammer(chosen, path, made, flat_names)
     source = options.baked_from(scene, scene_option, rock, bit)
     typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
-    return path
-
-
-def write_drive(output: Path | None = None, flat_names: bool = False) -> Path:
-    """Write the FMU of the pneumatic drive and say so."""
-    from fmu_src.archive import content, state_of
-    from fmu_src.parts import pneumatic_drive
-    from fmu_src.parts.build import build_part
-
-    path = output or options.DIST / DRIVE
-    check_fmu(output, path)
-    before = content(path)
-    guid = build_part(pneumatic_drive.TABLE, path, flat_names)
-    typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")
     return path
 
 

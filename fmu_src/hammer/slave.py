@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS
+from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS, PRODUCT
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.warnings import Warnings
@@ -25,9 +25,8 @@ from fmu_src.slave.states import (
     pack_values,
     unpack_values,
 )
-from fmu_src.variables import closed_bounds
 from percussion_model.engine.library import place_to_compile
-from percussion_model.scene.inputs import INPUTS, no_effect_reason
+from percussion_model.scene.inputs import INPUTS, PRESSURES, no_effect_reason
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.scene.rows import refuse_value
 from percussion_model.scene.scene import Scene
@@ -55,8 +54,8 @@ class PercussiveHammer(Slave):
         scene = json.loads(text)
         self.baked = Scene(**scene["given"])
         self._identity = [scene["identity"], scene["given"]]
-        self._drive_row = self.baked.row_of("drive.force")
-        self._drive_bounds = closed_bounds(self._drive_row)
+        names = ("drive_force", *PRESSURES.values())
+        self._held = {name: self.baked[INPUTS[name].key] for name in names}
         self._drive_inputs = frozenset(DRIVE_INPUTS)
         self._warnings = Warnings()
         self.reset()
@@ -73,28 +72,27 @@ class PercussiveHammer(Slave):
         """Check bounds; before the first step the drive force and contradictions as well."""
         super().check(names)
         if self.phase < STEPPING:
-            self._check_drive(self.drive_forces(self.values)["drive_force"])
+            self._check_drive(self.drive_inputs(self.values))
             self.make_scene(self.values)
 
-    def _check_drive(self, force: float) -> None:
-        low, high = self._drive_bounds
-        if not low <= force <= high and not self._drive_row.allows(force):
-            name = "supply_pressure * drive.effective_area"
-            raise ValueError(refuse_value(self._drive_row, name, force))
+    def _check_drive(self, inputs: dict[str, float]) -> None:
+        name = PRESSURES.get(self.choice("effects.drive"), "drive_force")
+        row = self.baked.row_of(INPUTS[name].key)
+        if not row.allows(inputs[name]):
+            shown = PRODUCT if name == "drive_force" else "supply_pressure"
+            raise ValueError(refuse_value(row, shown, inputs[name]))
 
-    @staticmethod
-    def drive_forces(values: dict[str, Any]) -> dict[str, float]:
-        """Forces of the drive as the solver takes them [N]."""
+    def drive_inputs(self, values: dict[str, Any]) -> dict[str, float]:
+        """Inputs of the drive as the solver takes them."""
         on, pressure, area, force = (values[name] for name in DRIVE_INPUTS)
-        return {
-            "drive_force": pressure * area if on else 0.0,
-            "external_force": force if on else 0.0,
-        }
+        acting, name = pressure if on else 0.0, PRESSURES.get(self.choice("effects.drive"))
+        taken = {name: acting} if name else {"drive_force": acting * area}
+        return {**self._held, **taken, "external_force": force if on else 0.0}
 
     def solver_inputs(self, values: dict[str, Any]) -> dict[str, float]:
         """Inputs as the solver takes them."""
         found = {inner: values[name] for name, inner in PLAIN_INPUTS.items()}
-        return found | self.drive_forces(values)
+        return found | self.drive_inputs(values)
 
     def make_scene(self, values: dict[str, Any]) -> Scene:
         """Scene of these inputs and the parameters; `SceneError` if they contradict each other."""
@@ -172,9 +170,9 @@ class PercussiveHammer(Slave):
         values, acting, new = self.values, self.acting, self.new
         wanted = {PLAIN_INPUTS[name]: values[name] for name in new if name in PLAIN_INPUTS}
         if not self._drive_inputs.isdisjoint(new):
-            forces = self.drive_forces(values)
-            self._check_drive(forces["drive_force"])
-            wanted |= forces
+            drive = self.drive_inputs(values)
+            self._check_drive(drive)
+            wanted |= drive
         new.clear()
         changed = {name: value for name, value in wanted.items() if value != acting[name]}
         acting |= changed

@@ -20,7 +20,7 @@ from fmu_src.hammer.outputs import MODES, OUTPUTS
 from fmu_src.units import fmi_unit
 from fmu_src.variables import Causality, Variable, magnitude, number_row
 from percussion_model.components import COMPONENTS
-from percussion_model.scene.inputs import INPUTS
+from percussion_model.scene.inputs import INPUTS, PRESSURES
 from percussion_model.scene.parameters import parameter_table, row_of
 from percussion_model.scene.rows import ParameterRow
 from percussion_model.scene.scene import Scene
@@ -48,18 +48,19 @@ DISPLAYS = {
 DISPLAYS_OF = {"youngs_modulus": "MPa"}
 
 # What an input of the FMU stands for in the table, rock before drive; the rest of a scene
-# is a parameter. The drive force is the product of two numbers.
+# is a parameter. The drive force is the product of two numbers; chambers take one as it is.
 TABLE_INPUTS = {
     NAMES_OUTSIDE[name]: one
     for name, one in sorted(INPUTS.items(), key=lambda item: item[1].at_once)
-    if name != "drive_force"
+    if NAMES_OUTSIDE[name] != "supply_pressure"
 }
 PRESSURE_ROW = number_row(
     "supply_pressure", "Pa", 0.0, 1e9,
-    "gauge supply pressure; drive force F_0 = pressure * drive.effective_area",
+    "gauge pressure of the supply at the hammer; drive force of the pressure law F_0 = pressure * "
+    "drive.effective_area",
 )  # fmt: skip
 AREA_ROW = number_row(
-    "drive.effective_area", "m^2", 0.0, 10.0, "area on which the supply pressure acts"
+    "drive.effective_area", "m^2", 0.0, 10.0, "area of supply_pressure in the pressure law"
 )
 PLACE_ROW = number_row(
     "gauge.position", "m", 0.0, 1e5, "place of the gauge, from the top of its bar"
@@ -121,6 +122,12 @@ def split_drive_force(force: float) -> tuple[float, float]:
     raise ArithmeticError(f"no pressure and area give {force!r} N")
 
 
+def start_pressure(scene: Scene) -> float:
+    """Pressure at the hammer with which a scene begins [Pa]."""
+    name = PRESSURES.get(scene.effects.drive)
+    return scene[INPUTS[name].key] if name else split_drive_force(scene.drive.force)[0]
+
+
 def _inputs(scene: Scene) -> Iterator[Variable]:
     order = ["feed_force", "supply_pressure", "piston_force", "percussion_on"]
     order += [name for name in TABLE_INPUTS if name not in order]
@@ -137,7 +144,7 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
             )
             continue
         if name == "supply_pressure":
-            yield _number(PRESSURE_ROW, split_drive_force(scene.drive.force)[0], "input")
+            yield _number(PRESSURE_ROW, start_pressure(scene), "input")
             continue
         one, note = TABLE_INPUTS[name], ""
         if name == "piston_force":

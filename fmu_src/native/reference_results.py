@@ -74,7 +74,8 @@ class Experiment:
 def experiments(scene: Scene) -> list[Experiment]:
     """The experiments: one with constant inputs, one with all changes that have an effect."""
     inputs = [one for one in hammer_variables(scene) if one.causality == "input"]
-    idle = {NAMES_OUTSIDE[name] for name in INPUTS if no_effect_reason(scene, name)}
+    acting = {NAMES_OUTSIDE[name] for name in INPUTS if not no_effect_reason(scene, name)}
+    idle = set(NAMES_OUTSIDE.values()) - acting
     courses = {name: course for name, course in COURSES.items() if name not in idle}
     flags = () if idle >= {"supply_pressure", "piston_force"} else PERCUSSION_OFF
     times = {0.0, *flags, *(time for course in courses.values() for time, _ in course)}

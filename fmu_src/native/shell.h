@@ -154,9 +154,11 @@ typedef struct {
     uint32_t first_known, known_count; /* what an output depends on at the start */
 } Entry;
 
-/* The drive's force is a product of two numbers, and has bounds of its own. */
+/* The drive's force is a product of two numbers, and has bounds of its own; so has the pressure,
+ * where the drive is a choice that takes it as it is. */
 typedef struct {
-    uint32_t on, pressure, area; /* variables */
+    uint32_t on, pressure, area, kind; /* variables */
+    uint32_t choice;                   /* 0: any other, of a force */
     uint32_t name, allowed, unit;
     double lower, upper;
 } Drive;
@@ -179,7 +181,8 @@ typedef struct {
     const int64_t *choices;
     const int64_t *image; /* first words */
     size_t image_count;
-    const Drive *drive;
+    const Drive *drives;
+    size_t drive_count;
     const uint32_t *notes, *faults; /* templates: places in `text`; number 0 is unused */
     size_t note_count, fault_count;
     const Entry *entries; /* of the version of FMI that is spoken */

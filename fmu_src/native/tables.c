@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const char MAGIC[8] = "PHTABLE";
-enum { FILE_VERSION = 2 };
+enum { FILE_VERSION = 3 };
 
 enum {
     TEXT, HEAD, VARIABLES, CHOICES, IMAGE, DRIVE, NOTES, FAULTS, ENTRIES, MEMBERS, KNOWN,
@@ -44,7 +44,7 @@ static const size_t SIZES[SECTIONS] = {
 };
 
 _Static_assert(sizeof(Head) == 56 + 16 * SECTIONS, "the head has no gaps");
-_Static_assert(sizeof(Variable) == 80 && sizeof(Entry) == 32 && sizeof(Drive) == 40,
+_Static_assert(sizeof(Variable) == 80 && sizeof(Entry) == 32 && sizeof(Drive) == 48,
                "records have no gaps");
 
 static bool is_head_good(const Head *head, const uint8_t *file, size_t size, Text *fault) {
@@ -80,7 +80,7 @@ static bool are_sections_good(const Head *head, size_t size) {
             return false;
         }
     }
-    return head->section[HEAD].count == HEAD_COUNT && head->section[DRIVE].count <= 1;
+    return size % 8 == 0 && head->section[HEAD].count == HEAD_COUNT; /* with the last one's fill */
 }
 
 static const void *begin_of(const Tables *tables, const Head *head, int which) {
@@ -99,7 +99,8 @@ static void take_sections(Tables *tables, const Head *head) {
     tables->choices = begin_of(tables, head, CHOICES);
     tables->image = begin_of(tables, head, IMAGE);
     tables->image_count = (size_t)section[IMAGE].count;
-    tables->drive = section[DRIVE].count > 0 ? begin_of(tables, head, DRIVE) : NULL;
+    tables->drives = begin_of(tables, head, DRIVE);
+    tables->drive_count = (size_t)section[DRIVE].count;
     tables->notes = begin_of(tables, head, NOTES);
     tables->note_count = (size_t)section[NOTES].count;
     tables->faults = begin_of(tables, head, FAULTS);
@@ -160,15 +161,15 @@ static bool is_variable_good(const Tables *tables, const Head *head, uint32_t k)
 }
 
 static bool are_variables_good(const Tables *tables, const Head *head) {
-    const Drive *drive = tables->drive;
     uint64_t count = tables->variable_count;
     bool is_good = (uint64_t)tables->input_count + tables->output_count <= count;
     for (uint32_t k = 0; is_good && k < count; k++) {
         is_good = is_variable_good(tables, head, k);
     }
-    if (is_good && drive != NULL) {
+    for (size_t k = 0; is_good && k < tables->drive_count; k++) {
+        const Drive *drive = tables->drives + k;
         is_good = drive->on < count && drive->pressure < count && drive->area < count &&
-                  are_texts(head, &drive->name, 3);
+                  drive->kind < count && are_texts(head, &drive->name, 3);
     }
     return is_good;
 }

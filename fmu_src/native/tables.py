@@ -13,12 +13,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from fmu_src.description import depends_at_start
-from fmu_src.hammer.inputs import DRIVE_INPUTS
+from fmu_src.hammer.inputs import DRIVE_INPUTS, PRODUCT
 from fmu_src.hammer.variables import TABLE_INPUTS, gauge_bars, hammer_variables
 from fmu_src.native import messages
 from fmu_src.native.variables3 import Variable3, fmi3_variables
 from fmu_src.variables import Variable, closed_bounds
 from percussion_model.engine.fault_texts import faults as faults_of
+from percussion_model.scene.inputs import INPUTS, PRESSURES
 from percussion_model.scene.numbers import (
     JOINT_KINDS,
     scene_numbers,
@@ -30,14 +31,14 @@ from percussion_model.scene.scene import Scene
 from percussion_model.scene.values import SCENE_NUMBERS
 
 FILE = "model.bin"
-MAGIC, VERSION = b"PHTABLE\0", 2
+MAGIC, VERSION = b"PHTABLE\0", 3
 # In this order in the file, as in `tables.c`.
 SECTIONS = ("text", "head", "variables", "choices", "image", "drive", "notes", "faults",
             "entries", "members", "known")  # fmt: skip
 SECTIONS_AT = 56
 VARIABLE = struct.Struct("<6I4d6I")
 ENTRY = struct.Struct("<8I")
-DRIVE = struct.Struct("<6I2d")
+DRIVE = struct.Struct("<8I2d")
 
 TYPES = {"Real": 1, "Integer": 2, "Boolean": 4, "Enumeration": 8}
 TYPES3 = {"Float64": 1, "Int32": 2, "Boolean": 4, "Enumeration": 8}
@@ -54,8 +55,6 @@ BARRIER_GIVEN = "#barrier_given"
 # Numbers of a joint that are variables, after its kind; as in `joint_numbers`.
 JOINT_FIELDS = ("transmission", "relaxation", "gap", "preload", "thread_stiffness")
 SECTION_FIELDS = ("length", "area", "youngs_modulus", "density")
-# The solver's name of the product of pressure and area in a message.
-DRIVE_NAME = "supply_pressure * drive.effective_area"
 
 
 @dataclass
@@ -172,7 +171,7 @@ class _Writer:
             "variables": (b"".join(records), len(records)),
             "choices": (struct.pack(f"<{len(self.choices)}q", *self.choices), len(self.choices)),
             "image": (self.image.packed(), len(self.image.words)),
-            "drive": (self._drive(), 1),
+            "drive": (b"".join(self._drives()), 1 + len(PRESSURES)),
             "notes": _whole([self._place(one) for one in notes]),
             "faults": _whole([self._place(one) for one in faults]),
             "entries": (b"".join(entries), len(entries)),
@@ -231,15 +230,17 @@ class _Writer:
             raise ValueError(f"{one.name} starts with {started!r}, but the scene has {held!r}")
         return conversion, place
 
-    def _drive(self) -> bytes:
-        """Bounds of the drive force, which is a product."""
-        row = self.scene.row_of("drive.force")
-        on, pressure, area, _ = DRIVE_INPUTS
-        return DRIVE.pack(
-            self.index[on], self.index[pressure], self.index[area],
-            self._place(DRIVE_NAME), self._place(row.allowed), self._place(unit_suffix(row.unit)),
-            *closed_bounds(row),
-        )  # fmt: skip
+    def _drives(self) -> Iterator[bytes]:
+        """Bounds of the drive force, which is a product, and of pressures of drives by choice."""
+        choices = self.scene.row_of("effects.drive").choices
+        names = [(PRODUCT, "drive_force", 0)]
+        names += [("supply_pressure", name, 1 + choices.index(drive))
+                  for drive, name in PRESSURES.items()]  # fmt: skip
+        at = [self.index[name] for name in (*DRIVE_INPUTS[:3], "effects.drive")]
+        for shown, name, choice in names:
+            row = self.scene.row_of(INPUTS[name].key)
+            texts = map(self._place, (shown, row.allowed, unit_suffix(row.unit)))
+            yield DRIVE.pack(*at, choice, *texts, *closed_bounds(row))
 
     def _known_at_start(self, one: Variable3, found: Sequence[Variable3]) -> list[int]:
         """Indices of the variables of FMI 3.0 on which one depends at the start."""

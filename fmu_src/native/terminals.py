@@ -62,10 +62,13 @@ TERMINALS = (
     ),
     Terminal(
         "air",
-        "supply of chambers with air, for effects.drive = pneumatic",
+        "supply of chambers with air, and the hole, for effects.drive = pneumatic",
         {
-            "supply_pressure": "pneumatic.supply_pressure",
+            "supply_pressure": "supply_pressure",
+            "percussion_on": "percussion_on",
             "supply_flow": "pneumatic.supply_flow",
+            "air_used": "pneumatic.consumed",
+            "back_pressure": "pneumatic.back_pressure",
         },
     ),
     Terminal(

@@ -86,16 +86,20 @@ Status check_values(Instance *one, const double *values, uint32_t first, uint32_
 }
 
 Status check_drive(Instance *one, const double *values) {
-    const Drive *drive = one->tables.drive;
+    const Drive *drive = NULL;
+    for (size_t k = 0; k < one->tables.drive_count; k++) {
+        const Drive *other = one->tables.drives + k;
+        drive = k == 0 || values[other->kind] == other->choice ? other : drive;
+    }
     if (drive == NULL) {
         return DONE;
     }
-    double on = values[drive->on], force = values[drive->pressure] * values[drive->area];
-    force = on != 0.0 ? force : 0.0;
-    if (force >= drive->lower && force <= drive->upper) {
+    double value = values[drive->on] != 0.0 ? values[drive->pressure] : 0.0;
+    value *= drive->choice == 0 ? values[drive->area] : 1.0;
+    if (value >= drive->lower && value <= drive->upper) {
         return DONE;
     }
-    return refuse_value(one, name_of(one, drive->name), force, true, name_of(one, drive->unit),
+    return refuse_value(one, name_of(one, drive->name), value, true, name_of(one, drive->unit),
                         name_of(one, drive->allowed));
 }
 

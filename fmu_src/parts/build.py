@@ -21,6 +21,10 @@ from fmu_src.staging import stage
 from fmu_src.units import fmi_unit
 from fmu_src.variables import FILE, Variable, magnitude, number_row, write_variables
 
+# First value references, units to display, and the default experiment [s].
+FIRST = {"input": 1, "output": 100, "parameter": 200}
+DISPLAYS = {"Pa": "bar", "N": "kN", "m/s": "mm/s", "Hz": "1/min"}
+STOP_TIME, STEP_SIZE = 4.0, 1e-3
 # Parts of a drilling system, by the name of their FMU.
 PARTS = {
     module.TABLE.name: module.TABLE
@@ -31,7 +35,7 @@ PARTS = {
 def part_variables(part: PartTable) -> list[Variable]:
     """Variables of a part, in the order of its table."""
     return [
-        make(part, name, part.first[causality] + k, causality, entry)
+        make(part, name, FIRST[causality] + k, causality, entry)
         for causality, entries, make in (
             ("input", part.inputs, _given),
             ("output", part.outputs, _output),
@@ -44,7 +48,7 @@ def part_variables(part: PartTable) -> list[Variable]:
 def _output(
     part: PartTable, name: str, reference: int, causality: Any, entry: tuple[Any, ...]
 ) -> Variable:
-    unit, *bounds, text = entry
+    unit, text = entry
     common: dict[str, Any] = {
         "name": name, "reference": reference, "causality": causality, "description": text,
         "at_start": part.at_start.get(name),
@@ -53,7 +57,6 @@ def _output(
         return Variable(type="Boolean", variability="discrete", **common)
     if unit == COUNT:
         return Variable(type="Integer", variability="discrete", **common)
-    common |= dict(zip(("lower", "upper", "nominal"), bounds, strict=False))
     return _real(part, unit, **common)
 
 
@@ -86,15 +89,15 @@ def _given(
 
 def _real(part: PartTable, unit: str, **rest: Any) -> Variable:
     shown = fmi_unit(unit)
-    given = {"variability": "continuous", "display": part.displays.get(shown)} | rest
+    given = {"variability": "continuous", "display": DISPLAYS.get(shown)} | rest
     return Variable(type="Real", unit=shown, **given)
 
 
 def build_part(part: PartTable, path: Path, flat: bool = False) -> str:
     """Write the FMU of a part, with `flat` names of variables or not; return its GUID."""
     variables = part_variables(part)
-    about = About(path.stem, part.description, part.stop_time, part.step_size, flat=flat)
-    bundle = stage(part.bundle, "parts", with_model=False)
+    about = About(path.stem, part.description, STOP_TIME, STEP_SIZE, flat=flat)
+    bundle = stage("drilling_system", "parts", with_model=False)
     return write_fmu(
         path, about, variables, bundle, part.slave, {FILE: write_variables(variables)},
         write_page(about, variables),

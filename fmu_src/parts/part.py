@@ -198,10 +198,9 @@ class PartTable:
     """Description and variables of a part; SI, forces and positions down positive.
 
     An entry of inputs and parameters is (unit, lower, upper, start, description), one of
-    outputs (unit, description) or (unit, lower, upper, nominal, description). A start that is
-    a flag makes a Boolean, as does False for the unit of an output; the unit COUNT makes a
-    whole number, and a tuple in place of the start an enumeration, whose first word is the
-    start.
+    outputs (unit, description). A start that is a flag makes a Boolean, as does False for the
+    unit of an output; the unit COUNT makes a whole number, and a tuple in place of the start an
+    enumeration, whose first word is the start.
 
     Attributes
     ----------
@@ -212,14 +211,6 @@ class PartTable:
     at_start : dict of tuple
         Inputs that an output depends on at the start, beside parameters; outputs that are
         left out are the same at every start.
-    first : dict of int
-        First value reference by causality.
-    displays : dict of str
-        Units to display, by unit of the interface.
-    stop_time, step_size : float
-        Of the default experiment [s].
-    bundle : str
-        Beginning of the name under which the FMU keeps its sources.
     """
 
     name: str
@@ -229,12 +220,3 @@ class PartTable:
     outputs: Entries
     parameters: Entries
     at_start: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    first: Mapping[str, int] = field(
-        default_factory=lambda: {"input": 1, "output": 100, "parameter": 200}
-    )
-    displays: Mapping[str, str] = field(
-        default_factory=lambda: {"Pa": "bar", "N": "kN", "m/s": "mm/s", "Hz": "1/min"}
-    )
-    stop_time: float = 4.0
-    step_size: float = 1e-3
-    bundle: str = "drilling_system"

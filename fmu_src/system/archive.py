@@ -15,6 +15,7 @@ from fmu_src.archive import write_archive
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS
+from percussion_model.coupling.component import CouplingError, number_of_word
 from percussion_model.coupling.ssp import FMU
 from percussion_model.coupling.ssp_xml import SPACES, tag
 from percussion_model.scene.presets import scenario_folder, scene_file, system_file
@@ -216,7 +217,12 @@ def _check(plan: SystemPlan, variables: dict[str, dict[str, Any]]) -> None:
             one = variables.get(component, {}).get(name)
             if one is None or one.causality == "output":
                 raise SystemPlanError(f"parameter {component}.{name}: there is no such variable")
-            if not isinstance(value, (bool, int, float)):
+            if isinstance(value, str) and one.type == "Enumeration":
+                try:
+                    number_of_word(component, one, value)
+                except CouplingError as error:
+                    raise SystemPlanError(f"parameter {error}") from None
+            elif not isinstance(value, (bool, int, float)):
                 shown = show_value(value)
                 raise SystemPlanError(f"parameter {component}.{name} = {shown}: must be a number")
 
@@ -302,6 +308,8 @@ def _values(values: dict[str, Any], variables: dict[str, Any]) -> bytes:
     parameters = _add(root, "ssv", "Parameters")
     for name, value in values.items():
         kind = _TYPES[variables[name].type]
+        if isinstance(value, str):
+            value = number_of_word("", variables[name], value)
         parameter = _add(parameters, "ssv", "Parameter", name=name)
         _add(parameter, "ssv", kind, value=_WRITTEN[kind](value))
     return _text(root)

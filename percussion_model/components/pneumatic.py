@@ -22,7 +22,6 @@ from percussion_model.physics.chambers import (
     Gas,
     Way,
     go,
-    outside,
     size_of_lower,
     size_of_upper,
     started,
@@ -91,9 +90,15 @@ def set_pressure(par, s):
 
 
 @inlined
-def open_air(par, x):
+def outside(par, s):
+    """Pressure behind the flushing holes [Pa]."""
+    return par.pneumatic_ambient_pressure + s.pneumatic_back_pressure
+
+
+@inlined
+def open_air(par, hole, x):
     """Gas of the surroundings in all volumes, as before a first blow."""
-    pressure = max(outside(par), LEAST_PRESSURE)
+    pressure = max(hole, LEAST_PRESSURE)
     m, e = pressure / (AIR * par.pneumatic_ambient_temperature), pressure / (RATIO - 1.0)
     u, low, behind = size_of_upper(par, x), size_of_lower(par, x), par.pneumatic_exhaust_volume
     return Gas(m * u, e * u, m * low, e * low, m * behind, e * behind)
@@ -102,15 +107,13 @@ def open_air(par, x):
 @inlined
 def feed_supply(par, s, used, h):
     """Take air from the supply, and let the compressor give as much as it may."""
-    if par.pneumatic_supply_volume == 0.0:
+    if par.pneumatic_supply_volume == 0.0 or s.pneumatic_supply_flow == 0.0:
         s.pneumatic_supply = set_pressure(par, s)
         return
     by_mass = AIR * par.pneumatic_supply_temperature / par.pneumatic_supply_volume
     s.pneumatic_supply -= by_mass * used
     wanted = max(set_pressure(par, s) - s.pneumatic_supply, 0.0)
-    if s.pneumatic_supply_flow > 0.0:
-        wanted = min(wanted, by_mass * s.pneumatic_supply_flow * h)
-    s.pneumatic_supply += wanted
+    s.pneumatic_supply += min(wanted, by_mass * s.pneumatic_supply_flow * h)
 
 
 @inlined
@@ -128,7 +131,9 @@ def corrected(par, s, then, x):
     gas = Gas(
         gas.mass_u, gas.energy_u + up, gas.mass_l, gas.energy_l - given, gas.mass_x, gas.energy_x
     )
-    force = up - down - outside(par) * (par.pneumatic_upper_area - par.pneumatic_lower_area) * off
+    force = (
+        up - down - outside(par, s) * (par.pneumatic_upper_area - par.pneumatic_lower_area) * off
+    )
     done = then.done
     done = Done(
         done.used,
@@ -181,7 +186,9 @@ def settle(par, s):
         then = corrected(par, s, then, x)
     else:
         way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h)
-        then = go(par, s.pneumatic_supply, started(present_gas(s), before, 0.0), way)
+        then = go(
+            par, s.pneumatic_supply, outside(par, s), started(present_gas(s), before, 0.0), way
+        )
     keep_gas(par, s, then.gas)
     done = then.done
     feed_supply(par, s, done.used, h)
@@ -207,7 +214,9 @@ def foretell(par, s, span):
     s.pneumatic_touched, s.pneumatic_last_u = s.closed, s.u_r
     y = started(present_gas(s), x, v)
     u = s.v_b - s.v_p  # at which a piston that touches the bit goes on
-    then = go(par, s.pneumatic_supply, y, Way(s.closed == 1, x, u, x + u * d, u, d))
+    then = go(
+        par, s.pneumatic_supply, outside(par, s), y, Way(s.closed == 1, x, u, x + u * d, u, d)
+    )
     s.pneumatic_span, s.pneumatic_since = span, 0.0
     s.pneumatic_then_mass_u, s.pneumatic_then_energy_u = then.gas.mass_u, then.gas.energy_u
     s.pneumatic_then_mass_l, s.pneumatic_then_energy_l = then.gas.mass_l, then.gas.energy_l
@@ -256,7 +265,7 @@ def renew(par, s, h):
     if not is_over(s):
         return
     if s.pneumatic_mass_u == 0.0:
-        keep_gas(par, s, open_air(par, -s.u_r))
+        keep_gas(par, s, open_air(par, outside(par, s), -s.u_r))
         s.pneumatic_supply = set_pressure(par, s)
     elif s.pneumatic_since > 0.0:
         settle(par, s)
@@ -314,7 +323,8 @@ COMPONENT = Component(
     {
         "supply_pressure": (24e5, "Pa", "pressure of the supply at the hammer, above that of the "
                             "surroundings", 0.0, 2e7),
-        "supply_flow": (0.0, "kg/s", "most that the compressor gives; 0: as much as is needed",
+        "supply_flow": (0.0, "kg/s", "most that the compressor gives; 0: as much as is needed "
+                        "to hold the pressure",
                         0.0, 1e3),
         "supply_volume": (0.2, "m^3", "volume of the supply; 0: its pressure never falls, "
                           "whatever the compressor gives", 0.0, 1e3),
@@ -380,7 +390,7 @@ COMPONENT = Component(
         "consumed_before", "reach",
     ),
     pass_time=pass_time,
-    inputs=("supply_pressure", "supply_flow"),
+    inputs=("supply_pressure", "supply_flow", "back_pressure"),
     next_blow=next_blow,
     of_blow=("air",),
 )  # fmt: skip

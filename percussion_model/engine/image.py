@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from percussion_model.engine.memory import (
     floats_at,
     matrix_at,
@@ -12,7 +14,7 @@ from percussion_model.engine.memory import (
     words_at,
 )
 from percussion_model.engine.records import GaugeBar
-from percussion_model.engine.scene_image import COUNTS, JOINT, OWN, SECTION, VALUES, Own
+from percussion_model.engine.scene_image import COUNTS, JOINT, OWN, PRESSED, SECTION, VALUES, Own
 from percussion_model.physics.kernel import preparing
 from percussion_model.scene.numbers import JOINT_KINDS, Numbers
 from percussion_model.scene.values import SCENE_NUMBERS
@@ -40,7 +42,7 @@ def own_numbers(image):
 
 @viewing
 def fill_values(image, values):
-    """Fill in the parameters; the drive's forces follow from what only an FMU has.
+    """Fill in the parameters; what the drive does follows from what only an FMU has.
 
     Parameters
     ----------
@@ -50,10 +52,14 @@ def fill_values(image, values):
     """
     values[0] = _values_at(image + 8 * first_value(image), 1)[0]
     own = own_numbers(image)
+    pressure, is_law = own[Own.PRESSURE], True
     if own[Own.ON] == 0.0:
-        values[0].drive_force = values[0].drive_external_force = 0.0
-    else:
-        values[0].drive_force = own[Own.PRESSURE] * own[Own.AREA]
+        pressure = values[0].drive_external_force = 0.0
+    for drive, word in PRESSED:
+        if values[0].effects_drive == drive:
+            values.view(np.float64)[word], is_law = pressure, False
+    if is_law:
+        values[0].drive_force = pressure * own[Own.AREA]
 
 
 @merging

@@ -11,7 +11,9 @@ from enum import IntEnum
 
 import numpy as np
 
+from percussion_model.scene.inputs import PRESSURES
 from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.parameters import row_of
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers.state import words_of
 
@@ -19,6 +21,10 @@ COUNTS = 3  # words before the sections of each rod
 VALUES = SCENE_NUMBERS.itemsize // 8
 SECTION, JOINT = 4, 6
 AT = words_of(SCENE_NUMBERS)
+# Drives that take a pressure as it is: the choice of `effects.drive`, and the pressure's word.
+PRESSED = tuple(
+    (row_of("effects.drive").choices.index(drive), AT[field]) for drive, field in PRESSURES.items()
+)
 
 
 class Own(IntEnum):
@@ -46,7 +52,8 @@ def image_of(numbers: Numbers) -> np.ndarray:
     counts = [len(numbers.piston), len(numbers.bit), len(numbers.rod_counts), *numbers.rod_counts]
     values = np.array([numbers.values], SCENE_NUMBERS)
     own = np.zeros(OWN)
-    own[Own.PRESSURE], own[Own.AREA] = values[0]["drive_force"], 1.0
+    word = dict(PRESSED).get(int(values[0]["effects_drive"]), AT["drive_force"])
+    own[Own.PRESSURE], own[Own.AREA] = values.view(np.float64)[word], 1.0
     own[Own.ON], own[Own.GAUGE_PLACE] = 1.0, -1.0
     rows = (numbers.piston, numbers.bit, numbers.rod_sections, numbers.joints, own)
     parts = [np.array(counts, np.int64), values.view(np.int64)]

@@ -87,12 +87,6 @@ def opened(par, area, share):
     return par.pneumatic_discharge * (area * min(max(share, 0.0), 1.0) + par.pneumatic_leak)
 
 
-@inlined
-def outside(par):
-    """Pressure behind the flushing holes [Pa]."""
-    return par.pneumatic_ambient_pressure + par.pneumatic_back_pressure
-
-
 @kernel
 def rates_of(par, air, around, y, bounds):
     """What changes in a second; `x` and `v` as those of a free piston above a bit at rest.
@@ -132,7 +126,7 @@ def rates_of(par, air, around, y, bounds):
     grow_u = -area_u * v if area_u * x < (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume else 0.0
     rubbing = par.pneumatic_friction * v / math.sqrt(v * v + CREEP * CREEP)
     force = upper.pressure * area_u - lower.pressure * area_l
-    force += rubbing - outside(par) * (area_u - area_l)
+    force += rubbing - around.pressure * (area_u - area_l)
     beyond = x - (1.0 - LEAST_SHARE) * par.pneumatic_upper_volume / area_u
     force += STOP * max(beyond, 0.0)
     rate = 0.0
@@ -168,7 +162,7 @@ def rates_of(par, air, around, y, bounds):
             to_upper.energy + to_lower.energy + past.energy - out.energy + heat_u + heat_l,
             upper.pressure * grow_u + lower.pressure * grow_l,
             force,
-            (lower.pressure - outside(par)) * area_l,
+            (lower.pressure - around.pressure) * area_l,
             -force * v,
         ),
         rate,
@@ -251,10 +245,16 @@ def next_bend(par, x, v):
 
 
 @kernel
-def go(par, supply, y, way):
-    """Integrate the gas over a way, or with a piston that flies; classical Runge-Kutta steps."""
+def go(par, supply, hole, y, way):
+    """Integrate the gas over a way, or with a piston that flies; classical Runge-Kutta steps.
+
+    Parameters
+    ----------
+    supply, hole : float
+        Pressures of the supply, and behind the flushing holes [Pa].
+    """
     air = reservoir(supply, par.pneumatic_supply_temperature)
-    around = reservoir(outside(par), par.pneumatic_ambient_temperature)
+    around = reservoir(hole, par.pneumatic_ambient_temperature)
     t, left = 0.0, way.span
     for _ in range(MOST_STEPS):
         here, end, h = y, y, 0.0

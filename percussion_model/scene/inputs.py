@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from percussion_model.components import COMPONENTS
+from percussion_model.components import COMPONENTS, DRIVES
 from percussion_model.scene.rows import REFUSED
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.units import read_value, refuse
@@ -46,6 +46,10 @@ INPUTS = {
         for one in COMPONENTS
         for name in one.inputs
     },
+}
+# Inputs that are the pressure at the hammer, by the choice of `effects.drive`.
+PRESSURES = {
+    one.name: f"{one.name}_supply_pressure" for one in DRIVES if "supply_pressure" in one.inputs
 }
 
 

@@ -119,8 +119,11 @@ def chamber(**changes):
 @kernel
 def carried(par_, v, then, span):
     """Gas and work after a piston has gone up from the bit, or flown for a time from there."""
-    gas = open_air(par_[0], 0.0)
-    end = go(par_[0], 0.0, started(gas, 0.0, v), Way(then > 0.0, 0.0, 0.0, then, 0.0, span))
+    outside = par_[0].pneumatic_ambient_pressure
+    gas = open_air(par_[0], outside, 0.0)
+    end = go(
+        par_[0], 0.0, outside, started(gas, 0.0, v), Way(then > 0.0, 0.0, 0.0, then, 0.0, span)
+    )
     return end.gas.energy_u, end.gas.mass_u, end.done.work, end.x
 
 

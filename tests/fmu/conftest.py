@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fmu_src.hammer.build import build_hammer
-from fmu_src.parts import pneumatic_drive
-from fmu_src.parts.build import build_part
+from fmu_src.parts.build import PARTS, build_part
 from percussion_model import Scene
 from scenarios.harness import Instance
 
@@ -16,14 +15,14 @@ RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 @pytest.fixture(scope="session")
 def fmus(built_library, tmp_path_factory):
     """Folder with the reference's FMU, that of rigid bodies, both also without a library, and
-    the pneumatic one.
+    the supply's.
     """
     folder = tmp_path_factory.mktemp("fmus")
     build_hammer(Scene(), folder / "PercussiveHammer.fmu")
     build_hammer(Scene().replace(**RIGID), folder / "RigidHammer.fmu")
     build_hammer(Scene(), folder / "NumbaHammer.fmu", libraries={})
     build_hammer(Scene().replace(**RIGID), folder / "NumbaRigidHammer.fmu", libraries={})
-    build_part(pneumatic_drive.TABLE, folder / "PneumaticDrive.fmu")
+    build_part(PARTS["Supply"], folder / "Supply.fmu")
     return folder
 
 

@@ -27,7 +27,6 @@ from fmpy import extract
 from fmpy.fmi1 import FMICallException
 
 from fmu_src.hammer.build import build_hammer
-from fmu_src.parts import pneumatic_drive
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.slave.states import HEADER, PLACE, START, pack
 from percussion_model import Scene
@@ -58,7 +57,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "NumbaRigidHammer": {},
     **{name: {} for name in PARTS},
     "DrillString/lumped": {"model": 2, "rod.automatic": True},
-    "PneumaticDrive": {},
+    "Supply/air": {"medium": "air"},
 }
 
 
@@ -71,8 +70,6 @@ def build(names: Sequence[str], folder: Path) -> dict[str, str]:
         if not path.exists():
             if base in PARTS:
                 build_part(PARTS[base], path)
-            elif base == "PneumaticDrive":
-                build_part(pneumatic_drive.TABLE, path)
             else:
                 changes = {
                     "PercussiveHammer": {},

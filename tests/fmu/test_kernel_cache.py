@@ -20,7 +20,7 @@ from scenarios.harness import Instance
 instance = Instance(sys.argv[1]).start()
 instance.step(1e-3)
 for name, module in sys.modules.items():
-    if name.endswith("fmu_src.parts.pneumatic_drive"):
+    if name.endswith("fmu_src.parts.supply"):
         print("code:", module.__file__)
 print("log:", *instance.messages)
 instance.free()
@@ -49,7 +49,7 @@ def look(fmu, cache, **environment):
 
 @pytest.fixture
 def fmu(fmus):
-    return fmus / "PneumaticDrive.fmu"
+    return fmus / "Supply.fmu"
 
 
 @pytest.fixture
@@ -66,8 +66,8 @@ def filled(fmu, tmp_path):
 def plant(code):
     """Change a module, its size being as before."""
     text = code.read_text()
-    line = next(one for one in text.splitlines() if one.startswith("GAS_CONSTANT = 287.0"))
-    planted = text.replace(line, f'GAS_CONSTANT = print("{PLANTED}") or 287.0'.ljust(len(line)))
+    line = next(one for one in text.splitlines() if one.startswith("LONGEST_STEP = 1e-3"))
+    planted = text.replace(line, f'LONGEST_STEP = print("{PLANTED}") or 1e-3'.ljust(len(line)))
     code.write_text(planted)
     assert PLANTED in planted
     assert len(planted) == len(text)

@@ -50,7 +50,7 @@ def refused(call, *words):
 def works(slave, time=0.0):
     for k in range(3):
         slave.doStep(time + 1e-3 * k, 1e-3)
-    return slave.getReal(refs["piston_force"])[0]
+    return slave.getReal(refs["supply_pressure"])[0]
 
 wanted = works(start(new()))
 slave = new()
@@ -96,7 +96,7 @@ assert works(slave) == wanted
 assert works(start(slave)) == wanted
 slave.terminate()
 refused(slave.terminate, "fmi2Terminate", "terminated")
-assert slave.getReal(refs["piston_force"])[0] == wanted
+assert slave.getReal(refs["supply_pressure"])[0] == wanted
 """,
     "a step after the end": """
 works(start(slave))
@@ -105,11 +105,11 @@ refused(lambda: slave.doStep(3e-3, 1e-3), "fmi2DoStep", "terminated")
 """,
     "inputs after the end": """
 works(start(slave))
-slave.setReal(refs["velocity"], [-1.0])  # as often as a host does, so that its path is short
-slave.setReal(refs["velocity"], [0.0])
+slave.setReal(refs["blow_frequency"], [2.0])  # as often as a host does, so that its path is short
+slave.setReal(refs["blow_frequency"], [0.0])
 slave.terminate()
-refused(lambda: slave.setReal(refs["velocity"], [1.0]), "fmi2SetReal", "after fmi2Terminate")
-assert slave.getReal(refs["velocity"]) == [0.0]
+refused(lambda: slave.setReal(refs["blow_frequency"], [1.0]), "fmi2SetReal", "after fmi2Terminate")
+assert slave.getReal(refs["blow_frequency"]) == [0.0]
 slave.reset()
 assert works(start(slave)) == wanted
 """,
@@ -128,13 +128,13 @@ def give(slave, saved):
     finally:
         slave.freeFMUstate(state)
 
-area = refs["area"]
-slave.setReal(area, [2e-3])
+resistance = refs["hose.resistance"]
+slave.setReal(resistance, [4e8])
 first = bytes_of(slave)
 slave.setupExperiment(startTime=0.5)
 set_up = bytes_of(slave)
 slave.enterInitializationMode()
-slave.getReal(refs["piston_force"])
+slave.getReal(refs["supply_pressure"])
 second = bytes_of(slave)
 slave.exitInitializationMode()
 third = bytes_of(slave)
@@ -145,7 +145,7 @@ slave.terminate()
 last = bytes_of(slave)
 for one in (slave, new()):
     give(one, first)
-    assert one.getReal(area) == [2e-3]
+    assert one.getReal(resistance) == [4e8]
     refused(one.enterInitializationMode, "fmi2SetupExperiment")
     give(one, set_up)
     one.enterInitializationMode()
@@ -160,7 +160,7 @@ for one in (slave, new()):
     give(one, last)
     refused(lambda: one.doStep(0.503, 1e-3), "terminated")
     give(one, fourth)
-    assert one.getReal(refs["piston_force"])[0] == given
+    assert one.getReal(refs["supply_pressure"])[0] == given
     one.doStep(0.503, 1e-3)
 """,
     "each category of the log": """
@@ -187,7 +187,7 @@ assert works(slave) == wanted
 start(slave)
 refused(lambda: slave.getReal([987654]), "987654")
 refused(lambda: slave.setReal([987654], [1.0]), "987654")
-refused(lambda: slave.setBoolean(refs["velocity"], [True]), "Boolean")
+refused(lambda: slave.setBoolean(refs["blow_frequency"], [True]), "Boolean")
 assert works(slave) == wanted
 """,
     "a hundred refusals": """
@@ -204,7 +204,7 @@ slave.freeInstance()
 @pytest.mark.parametrize("name", CASES)
 def test_misuse_is_refused_and_harms_nothing(unpacked, name):
     done = subprocess.run(
-        [sys.executable, "-c", f"{HOST}\n{CASES[name]}\nprint('done')", unpacked["PneumaticDrive"]],
+        [sys.executable, "-c", f"{HOST}\n{CASES[name]}\nprint('done')", unpacked["Supply"]],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stdout.strip()) == (0, "done"), done.stderr

@@ -148,17 +148,17 @@ def test_without_a_cache_folder_it_runs_from_a_temporary_one(fmus, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     cache = str(blocked / "in it")
-    fmu = fmus / "PneumaticDrive.fmu"
-    done = host(fmu, tmp_path, "upper.pressure", PERCUSSION_FMU_CACHE=cache, TMPDIR=str(tmp_path))
+    fmu = fmus / "Supply.fmu"
+    done = host(fmu, tmp_path, "supply_pressure", PERCUSSION_FMU_CACHE=cache, TMPDIR=str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert float(done.stderr) < 20e5
-    assert not list(tmp_path.glob("pneumatic*"))  # and takes it away
+    assert not list(tmp_path.glob("drilling*"))  # and takes it away
 
 
 def test_processes_that_start_together_share_one_copy_of_the_sources(fmus, tmp_path):
     cache = tmp_path / "cache"
-    fmu = str(fmus / "PneumaticDrive.fmu")
-    command = [sys.executable, "-c", HOST, fmu, ABSENT, "upper.pressure"]
+    fmu = str(fmus / "Supply.fmu")
+    command = [sys.executable, "-c", HOST, fmu, ABSENT, "supply_pressure"]
     environment = {**os.environ, "PYTHONPATH": "", "PERCUSSION_FMU_CACHE": str(cache)}
     several = [
         subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=environment)
@@ -167,5 +167,5 @@ def test_processes_that_start_together_share_one_copy_of_the_sources(fmus, tmp_p
     said = [process.communicate()[1] for process in several]
     assert [process.returncode for process in several] == [0] * 4, said
     assert len(set(said)) == 1
-    assert [path.name[:16] for path in cache.iterdir()] == ["pneumatic_drive_"]
+    assert [path.name[:16] for path in cache.iterdir()] == ["drilling_system_"]
     assert len(list(cache.glob("*"))) + len(list(cache.glob(".*"))) == 1  # no drafts are left

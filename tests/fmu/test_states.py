@@ -62,7 +62,7 @@ def test_a_state_that_never_was_bytes_repeats_too(make, name):
 
 
 @pytest.mark.parametrize(("name", "of"), [(RIGID[0], RIGID[1]), (RIGID[1], RIGID[0]),
-                                          (RIGID[0], "PneumaticDrive")])  # fmt: skip
+                                          (RIGID[0], "Supply")])  # fmt: skip
 def test_a_state_of_another_fmu_of_the_process_is_refused(make, name, of):
     instance, other = make(name), make(of)
     state = other.slave.getFMUstate()
@@ -180,14 +180,3 @@ def test_what_is_no_state_is_refused(make, wrong, name):
 @pytest.mark.parametrize("name", RIGID)
 def test_a_state_that_is_cut_short_is_refused(make, name):
     refused(make(name), make(name).save()[:-8], "bytes where")
-
-
-def test_the_pneumatic_drive_saves_its_state_too(make):
-    instance = make("PneumaticDrive")
-    instance.set({"displacement": -0.01, "velocity": -3.0})
-    instance.step(1e-3)
-    time, saved = instance.time, instance.save()
-    first = [instance.step(1e-4) or instance.values(instance.outputs) for _ in range(20)]
-    instance.restore(saved, time)
-    again = [instance.step(1e-4) or instance.values(instance.outputs) for _ in range(20)]
-    assert first == again

@@ -11,7 +11,6 @@ import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from fmu_src.commands.fmu import write_drive
 from fmu_src.description import write_description
 from fmu_src.flat_names import flat_name, flatten
 from fmu_src.hammer.build import about_hammer
@@ -20,6 +19,7 @@ from fmu_src.native.archive import write_native_fmu
 from fmu_src.native.build import build_native
 from fmu_src.native.library import library_here
 from fmu_src.native.reference_results import FOLDER
+from fmu_src.parts.build import PARTS, build_part
 from fmu_src.run import run_fmu
 from percussion_model import Scene
 from percussion_model.scene.presets import scene_presets
@@ -99,8 +99,8 @@ def test_a_flat_fmu_runs_and_holds_its_reference(built_library, tmp_path):
     assert "." not in head
 
 
-def test_the_drive_has_them_too(tmp_path):
-    write_drive(tmp_path / "Drive.fmu", flat_names=True)
-    model = read_model_description(str(tmp_path / "Drive.fmu"))
+def test_a_part_has_them_too(tmp_path):
+    build_part(PARTS["Supply"], tmp_path / "Supply.fmu", flat=True)
+    model = read_model_description(str(tmp_path / "Supply.fmu"))
     assert model.variableNamingConvention == "flat"
     assert all(one.name.isidentifier() for one in model.modelVariables)

@@ -74,6 +74,25 @@ def test_rotation_jams_where_nobody_looks_at_its_torque(feed_control):
     assert seeing.numbers["depth"] > 2.0 * jammed.numbers["depth"]
 
 
+def test_air_that_runs_short_changes_the_reaction_which_a_pi_makes_good(feed_control):
+    """Pressure, and with it blows and the drive's reaction on the casing, fall for seconds."""
+    slow = {"controller.pi.gain": 0.1, "controller.pi.time": 0.4}
+    found = [
+        bench(feed_control, controller, values, ["air"], check_step=False)[0]
+        for controller, values in ((nothing, {}), (None, slow), (None, {}))
+    ]
+    points = [score.points for score in found]
+    assert 0.0 < points[0] < points[1]
+    assert points[1] + 1.0 < points[2] <= 100.0
+    run = found[2].run
+    begin, end = np.searchsorted(run["time"], (1.0, 4.0))
+    for name in ("supply.supply_pressure", "hammer.blow_frequency"):
+        assert run[name][end - 1] < 0.97 * run[name][begin], name
+    # F_0 is as the pressure, and so is the reaction that the rig has to hold less of
+    command = run["controller.force_command"]
+    assert command[end - 1] < command[begin] - 100.0
+
+
 def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, capsys):
     source = tmp_path / "mine.py"
     source.write_text(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import zipfile
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from models import make_model, start_inputs
 
 from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.units import UNITS
+from percussion_model.physics.gas import AIR
 from scenarios.harness import Instance
 
 NAMES = sorted(PARTS)
@@ -152,6 +154,91 @@ def test_a_weak_source_lets_the_pressure_fall_and_the_relief_valve_caps_it():
     found = run(strong, "Supply", 500)
     assert found["relief_open"]
     assert found["hose_pressure"] == 1.5e6
+
+
+SHUT = {
+    "hose__diameter": 1e-3,
+    "hose__length": 1e5,
+    "hose__friction": 10.0,
+}  # a hose through which nothing flows
+
+
+def air(**values):
+    return make_model("Supply", **{"medium": "air", "pressure_command": 24e5, **values})
+
+
+def draw(supply, flow, count, step=1e-3, **inputs):
+    """Outputs after steps in which the hammer takes a flow [kg/s]."""
+    given = start_inputs("Supply") | {"pressure_command": 24e5} | inputs
+    for _ in range(count):
+        given["air_used"] = supply.line.used + flow * step
+        supply.step(given, step)
+    return supply.outputs()
+
+
+def test_a_receiver_fills_straight_and_then_by_its_time():
+    """p' = R T q / V of a compressor at its limit, exp(-t / time) near what is wanted."""
+    supply = air(start__pressure=10e5, compressor__flow_limit=0.4, **SHUT)
+    rate = AIR * 300.0 * 0.4 / supply.parameters["receiver.volume"]
+    found = draw(supply, 0.0, 5000)
+    assert found["hose_pressure"] == pytest.approx(10e5 + rate * 5.0, rel=1e-6)
+    assert found["flow"] == pytest.approx(0.4 * AIR * 300.0 / 101_325.0, rel=1e-12)
+    near = air(start__pressure=23.9e5, compressor__flow_limit=100.0, **SHUT)
+    time = near.parameters["source.time"]
+    found = draw(near, 0.0, 37)
+    off = 0.1e5 * math.exp(-0.037 / time)
+    assert 24e5 - found["hose_pressure"] == pytest.approx(off, rel=1e-6)
+
+
+def test_a_compressor_gives_what_the_hammer_takes_and_the_hose_costs_pressure():
+    supply = air(start__pressure=24e5)
+    found = draw(supply, 0.45, 20_000)
+    p, heat = supply.parameters, AIR * 300.0
+    assert supply.line.flow == pytest.approx(0.45, rel=1e-9)
+    droop = 0.45 * p["source.time"] * heat / p["receiver.volume"]
+    assert found["hose_pressure"] == pytest.approx(24e5 - droop, rel=1e-9)
+    area = 0.25 * math.pi * p["hose.diameter"] ** 2
+    lost = p["hose.friction"] * p["hose.length"] * heat / (p["hose.diameter"] * area**2) * 0.45**2
+    ends = (found[name] + 101_325.0 for name in ("hose_pressure", "supply_pressure"))
+    before, behind = ends
+    assert before**2 - behind**2 == pytest.approx(lost, rel=1e-9)
+    assert found["supply_pressure"] < found["hose_pressure"] - 1e4
+
+
+def test_a_hose_fills_from_a_large_receiver_in_finite_time():
+    """p_2' = k (p_1^2 - p_2^2)^(1/2): p_2 = p_1 sin(k t + phase)."""
+    supply = air(receiver__volume=1e3, hose__diameter=0.033, start__pressure=24e5)
+    line = supply.line
+    line.hose *= 0.1
+    full, k = 24e5 + 101_325.0, line.conductance / line.in_hose
+    for count in (100, 500):
+        time = 1e-3 * count + (0.1 if count == 500 else 0.0)
+        found = draw(supply, 0.0, count)["supply_pressure"] + 101_325.0
+        phase = k * time + math.asin(0.1)
+        assert found == pytest.approx(full * math.sin(min(phase, 0.5 * math.pi)), rel=2e-3)
+    assert k * 0.6 + math.asin(0.1) > 0.5 * math.pi  # it is full
+
+
+def test_no_air_is_lost_whatever_happens():
+    """Mass given is mass used, lost and stored, also where more is taken than there is."""
+    rng = random.Random(2)
+    supply = air(start__pressure=20e5, relief_pressure=25e5, compressor__flow_limit=0.3)
+    before, used = supply.outputs(), 0.0
+    for k in range(400):
+        wanted = 10e5 if 100 < k < 150 else 30e5
+        flow = rng.choice((-0.05, 0.0, 0.3, 2.0)) if k > 50 else 0.0
+        found = draw(supply, flow, 1, 0.02, pressure_command=wanted)
+        used += flow * 0.02
+    assert min(found["air_given"], found["air_lost"]) > 0.5
+    stored = found["air_stored"] - before["air_stored"]
+    assert found["air_given"] - used - found["air_lost"] == pytest.approx(stored, abs=1e-12)
+
+
+def test_water_in_the_hole_presses_by_its_height():
+    supply = air(hole__depth=30.0, water__depth=20.0)
+    found = [run(supply, "Supply", 1, bit_position=z)["back_pressure"] for z in (0.0, 5.0, -15.0)]
+    assert found == [1000.0 * 9.81 * 10.0, 1000.0 * 9.81 * 15.0, 0.0]
+    assert run(air(hole__depth=30.0), "Supply", 1)["back_pressure"] == 0.0
 
 
 def layered(**values):

@@ -11,6 +11,7 @@ from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
 
 _HERE = Path(__file__).parent
+CHAMBER_FILES = _HERE / "chambers"
 # A top hammer has so many rods where nothing else is asked for.
 USUAL_RODS = 4
 # Hammers with air in their chambers, and whose chambers of `chambers` these are, by size.
@@ -81,7 +82,7 @@ def with_air(name: str, pressure: float) -> Scene:
             f"hammer {name}: no chambers of air are known of it: there are those of "
             f"{', '.join(CHAMBERS)}"
         )
-    numbers = read_toml(_HERE / "chambers" / f"{CHAMBERS[name]}.toml")["pneumatic"]
+    numbers = read_toml(CHAMBER_FILES / f"{CHAMBERS[name]}.toml")["pneumatic"]
     changes = {f"pneumatic.{key}": value for key, value in numbers.items()}
     changes["pneumatic.supply_pressure"] = pressure
     return scene.replace(**{"effects.drive": "pneumatic", **_law(name, pressure), **changes})

@@ -218,7 +218,10 @@ def piston_event(par, s, y, acc, beta, k, tau, kind):
 def schedule(par, s):
     """Find the next event and note it in the state. Depends on the state alone."""
     s.closed = s.held
-    longest = min(par.window, lasting(par, s)) if par.effects == 1 else NEVER
+    longest = NEVER
+    if par.effects == 1:
+        lasts = lasting(par, s)
+        longest = lasts if lasts < NEVER else par.window
     hold_components(par, s, longest)
     find_next(par, s, longest)
     if 0.0 < s.next_tau < longest < NEVER:

@@ -229,7 +229,6 @@ def test_json_goes_to_a_pipe_and_a_link(tmp_path):
         ["calibrate", SCENE, "--measured", "penetration=1+-0.1 mm @5", "--figure"],
         ["new"],
         ["fmu", SCENE, "-o"],
-        ["fmu", "--pneumatics", "-o"],
     ],
     ids=lambda words: f"{words[0]} {words[-1]}",
 )
