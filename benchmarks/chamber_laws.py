@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from benchmarks.chamber_intervals import FOLDER
 from percussion_model.analysis.drive_map import LAW, blow_row, settled_row
-from percussion_model.scene.hammers import CHAMBERS, with_air
+from percussion_model.scene.hammers import AIR, with_chambers
 from percussion_model.scene.text import write_text
 
 PRESSURES = (4e5, 6e5, 8e5, 10e5, 14e5, 18e5, 24e5, 30e5, 35e5)
@@ -16,13 +16,13 @@ PRESSURES = (4e5, 6e5, 8e5, 10e5, 14e5, 18e5, 24e5, 30e5, 35e5)
 
 def laws_of(name: str) -> list[str]:
     """Lines of a hammer, a number in each for every pressure."""
-    scenes = [with_air(name, pressure) for pressure in PRESSURES]
+    scenes = [with_chambers(name, pressure) for pressure in PRESSURES]
     rows = [blow_row(scene, float(settled_row(scene)["rebound"])) for scene in scenes]
     keys = ("pressure", "rebound", *LAW)
     return [f"{key} = [{', '.join(f'{row[key]:.5g}' for row in rows)}]" for key in keys]
 
 
 if __name__ == "__main__":
-    lines = [line for name in CHAMBERS for line in ("", f"[{name}]", *laws_of(name))]
+    lines = [line for name in AIR for line in ("", f"[{name}]", *laws_of(name))]
     told = "# SI units, at the rebound that the rock gives. benchmarks/chamber_laws.py wrote this."
     write_text(FOLDER / "laws.toml", "\n".join([told, *lines, ""]))

@@ -17,13 +17,13 @@ from percussion_model import simulate
 from percussion_model.analysis.study import grid
 from percussion_model.interface.plotting import style
 from percussion_model.physics.gas import FREE_AIR
-from percussion_model.scene.hammers import with_air
+from percussion_model.scene.hammers import with_chambers
 from percussion_model.simulation.means import air_work
 
 NAME = "chambers"
 BAR, LITRE, MM = 1e5, 1e-3, 1e3
 SUPPLY, EDGE = "pneumatic.supply_pressure", "pneumatic.upper_intake_edge"
-SCENE = with_air("dth5", 24 * BAR)
+SCENE = with_chambers("dth5", 24 * BAR)
 # Air of compressors [m^3/s of free air], and the most pressure that they give [Pa].
 COMPRESSORS = {12.0 / 60.0: GREEN, 16.0 / 60.0: ORANGE, 20.0 / 60.0: BLUE}
 MOST_PRESSURE = 25 * BAR

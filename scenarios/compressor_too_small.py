@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.interface.progress import progress
-from percussion_model.scene.hammers import with_air
+from percussion_model.scene.hammers import with_chambers
 
 from .coupled import Quantity, draw_runs, print_columns, save_table
 from .harness import Instance
@@ -55,7 +55,7 @@ def build_hammer_of_air(path: Path = DIST / "AirHammer.fmu") -> None:
     from fmu_src.hammer.build import build_hammer
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    build_hammer(with_air("dth5", PRESSURE), path)
+    build_hammer(with_chambers("dth5", PRESSURE), path)
 
 
 def build_supply(path: Path = DIST / "Supply.fmu") -> None:

@@ -16,7 +16,7 @@ from percussion_model.interface.plotting.window import StressField, peak_stresse
 from percussion_model.interface.report import headline_rows, mean_cards
 from percussion_model.interface.terminal import show_settled, show_summary
 from percussion_model.physics.records import BLOW
-from percussion_model.scene.hammers import hammer, hammers, with_air
+from percussion_model.scene.hammers import hammer, hammers, with_chambers
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_numbers
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 
@@ -195,7 +195,7 @@ def test_an_fmu_knows_the_hole():
 
 @pytest.fixture(scope="module")
 def on_air():
-    return simulate(with_air("dth5", 24e5).computed_by("rigid"), 1.0, settle=0.5)
+    return simulate(with_chambers("dth5", 24e5).computed_by("rigid"), 1.0, settle=0.5)
 
 
 def test_power_and_efficiency_of_air_are_those_of_the_blows(on_air):
@@ -240,7 +240,7 @@ def test_without_chambers_nothing_is_told_of_air(result):
 
 
 def test_hammers_on_air_are_told_to_be_starved_or_to_have_stalled():
-    scene = with_air("dth5", 24e5).computed_by("rigid", **{"run.error_estimate": False})
+    scene = with_chambers("dth5", 24e5).computed_by("rigid", **{"run.error_estimate": False})
     small = {"pneumatic.supply_flow": 0.3, "pneumatic.supply_volume": 0.01}
     starved = simulate(scene.replace(**small), 2.0)
     assert [text for text in starved.warnings if text.startswith("the hammer is starved")]

@@ -23,14 +23,14 @@ from percussion_model.analysis.drive_map import (
 )
 from percussion_model.interface.cli import app
 from percussion_model.interface.commands import common
-from percussion_model.scene.hammers import CHAMBERS, with_air
+from percussion_model.scene.hammers import AIR, with_chambers
 
 BAR = 1e5
 
 
 @pytest.fixture(scope="module")
 def found():
-    return drive_map(with_air("dth5", 24 * BAR), [12 * BAR, 18 * BAR, 24 * BAR])
+    return drive_map(with_chambers("dth5", 24 * BAR), [12 * BAR, 18 * BAR, 24 * BAR])
 
 
 def test_a_law_without_weight_is_that_of_the_closed_form():
@@ -51,7 +51,7 @@ def test_a_law_gives_the_cycle_that_it_was_made_of(weight):
 
 @pytest.mark.parametrize(("bar", "rebound"), [(6, 0.1), (24, 0.3), (24, 0.5)])
 def test_a_run_by_the_law_has_velocity_and_period_of_the_chambers(bar, rebound):
-    scene = with_air("dth5", bar * BAR)
+    scene = with_chambers("dth5", bar * BAR)
     row = blow_row(scene, rebound)
     law = {f"drive.{name}": float(row[name]) for name in ("force", "reversal_distance")}
     by_law = on_a_wall(scene.replace(**{"effects.drive": "pressure", **law}), rebound)
@@ -63,7 +63,7 @@ def test_a_run_by_the_law_has_velocity_and_period_of_the_chambers(bar, rebound):
 def test_errors_by_the_rebound_are_those_of_an_independent_model():
     """5 inch, 15.30 kg, 24 bar: the law of rebound 0.3 at 0.1 and 0.5, energy and period in %."""
     steel = {"length": 0.4, "area": 15.30 / 0.4 / 7850.0, "density": 7850.0}
-    scene = with_air("dth5", 24 * BAR).replace(**{"piston.sections": [steel]})
+    scene = with_chambers("dth5", 24 * BAR).replace(**{"piston.sections": [steel]})
     usual = blow_row(scene, 0.3)
     law = float(usual["force"]), float(usual["reversal_distance"])
     # 470 N/bar and 42.8 mm are means from 6 to 35 bar
@@ -91,7 +91,7 @@ def test_rows_are_left_out_between_others_alone(found):
     assert known.tolist() == [ends, [True] * 4, ends]
     row, (below, above) = found.rows[1, 0], found.rows[[0, 2], 0]
     law = [0.5 * (below[name] + above[name]) for name in ("force", "reversal_distance")]
-    mass = with_air("dth5", BAR).piston.mass
+    mass = with_chambers("dth5", BAR).piston.mass
     v, period = law_cycle(mass, mass * 9.81, *law, 0.1)
     off = 1.0 / (period * row["frequency"]) - 1.0, (v / row["impact_velocity"]) ** 2 - 1.0
     assert [row[name] for name in LEFT_OUT] == pytest.approx(off, rel=1e-9)
@@ -99,18 +99,20 @@ def test_rows_are_left_out_between_others_alone(found):
     assert found.law(15 * BAR, 0.1)[0] == pytest.approx(0.5 * (below["force"] + row["force"]))
 
 
-@pytest.mark.parametrize("name", CHAMBERS)
+@pytest.mark.parametrize("name", AIR)
 def test_hammers_with_air_have_the_law_that_stands_for_their_chambers(name):
     """Between stored pressures, at the rebound of their rock."""
-    scene = with_air(name, 21 * BAR)
+    scene = with_chambers(name, 21 * BAR)
     row = blow_row(scene, float(settled_row(scene)["rebound"]))
     law = scene.drive.force, scene.drive.reversal_distance
     assert law == pytest.approx([float(row[key]) for key in LAW], rel=5e-3)
-    assert with_air(name, 50 * BAR).drive.force > 1.4 * with_air(name, 35 * BAR).drive.force
+    assert (
+        with_chambers(name, 50 * BAR).drive.force > 1.4 * with_chambers(name, 35 * BAR).drive.force
+    )
 
 
 def test_a_hammer_set_back_to_the_law_goes_on_as_with_its_chambers():
-    by_air = with_air("dth5", 24 * BAR)
+    by_air = with_chambers("dth5", 24 * BAR)
     air, law = (
         settled_row(by_air.replace(**{"effects.drive": d})) for d in ("pneumatic", "pressure")
     )
@@ -119,7 +121,7 @@ def test_a_hammer_set_back_to_the_law_goes_on_as_with_its_chambers():
 
 
 def test_the_law_that_stands_by_is_not_told_to_be_given_in_vain():
-    scene = with_air("dth5", 24 * BAR)
+    scene = with_chambers("dth5", 24 * BAR)
     assert set(scene.unused) == {"drive.force", "drive.reversal_distance"}
     assert not any("without effect" in text for text in simulate(scene, 0.1).warnings)
     alone = Scene().replace(**{"effects.drive": "pneumatic", "drive.force": 5e3})
@@ -140,20 +142,20 @@ def test_a_hammer_on_another_rock_is_told_to_have_the_law_of_its_usual_one(tmp_p
 @pytest.mark.parametrize("pressure", [-1e5, 3e7])
 def test_a_pressure_out_of_bounds_is_refused_by_its_name(pressure):
     with pytest.raises(SceneError, match=r"pneumatic.supply_pressure = "):
-        with_air("dth5", pressure)
+        with_chambers("dth5", pressure)
 
 
 def test_pressures_at_which_blows_die_out_have_no_law():
-    found = drive_map(with_air("dth5", 24 * BAR), [0.2 * BAR, 24 * BAR], [0.3])
+    found = drive_map(with_chambers("dth5", 24 * BAR), [0.2 * BAR, 24 * BAR], [0.3])
     assert np.isnan(found.rows["force"]).tolist() == [[True], [False]]
     assert np.isnan(found.own["rock_rate"][0])
     assert found.worst.keys() == {"rows", "own"}
-    assert drive_map(with_air("dth5", 24 * BAR), [0.2 * BAR], [0.3]).worst == {}
+    assert drive_map(with_chambers("dth5", 24 * BAR), [0.2 * BAR], [0.3]).worst == {}
 
 
 def test_the_command_writes_the_map_and_says_what_its_main_error_is(tmp_path):
     scene, file = tmp_path / "air.toml", tmp_path / "map.csv"
-    with_air("dth5", 24 * BAR).to_toml(scene)
+    with_chambers("dth5", 24 * BAR).to_toml(scene)
     words = ["drive-map", str(scene), "--pressures", "18bar,24bar", "--out", str(file)]
     done = CliRunner().invoke(app, [*words, "--rebounds", "0.1,0.3"])
     assert done.exit_code == 0
@@ -168,9 +170,9 @@ def test_what_cannot_be_mapped_is_refused(tmp_path):
     with pytest.raises(SceneError, match='"pressure": must be "pneumatic"'):
         drive_map(Scene())
     with pytest.raises(SceneError, match="must be numbers from 0 on and below 1"):
-        drive_map(with_air("dth5", 24 * BAR), None, [1.0])
+        drive_map(with_chambers("dth5", 24 * BAR), None, [1.0])
     scene = tmp_path / "air.toml"
-    with_air("dth5", 24 * BAR).to_toml(scene)
+    with_chambers("dth5", 24 * BAR).to_toml(scene)
     done = CliRunner().invoke(app, ["drive-map", str(scene), "--pressures", "10,x bar"])
     assert done.exit_code == 2
     assert "--pressures 10,x bar: give each value its unit" in done.stderr

@@ -72,6 +72,13 @@ TERMINALS = (
         },
     ),
     Terminal(
+        "oil",
+        "pump of chambers with oil, for effects.drive = hydraulic",
+        {
+            "flow": "hydraulic.flow",
+        },
+    ),
+    Terminal(
         "rock",
         "rock under the bit, where its properties change with depth",
         {

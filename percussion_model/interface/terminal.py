@@ -60,6 +60,8 @@ SHOWN = (
     ("Peak contact force", "peak_contact_force", 1e-3, "kN"),
     ("Standstill bit force", "standstill_bit_force", 1e-3, "kN"),
     ("Free air (0 °C, 1 atm)", "pneumatic_air", 60.0 / FREE_AIR, "m³/min"),
+    ("Oil", "hydraulic_oil", 6e4, "l/min"),
+    ("Mean pressure of the oil", "hydraulic_pressure", 1e-5, "bar"),
     ("Power less the rebound", "net_percussive_power", 1e-3, "kW"),
     ("Percussive power by air power", "air_efficiency", 100.0, "%"),
 )

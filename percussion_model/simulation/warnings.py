@@ -36,6 +36,11 @@ MOST_WAVE_SPEED_ERROR = 1e-3
 STANDING = 1e-2
 # A supply below this share of what it is set to is starved.
 STARVED = 0.95
+# A rear chamber of oil is below the pressure around it for about 3 % of the time, as measured; an
+# accumulator is never empty.
+MOST_VOID, MOST_EMPTY = 0.1, 0.01
+# Work that the oil has done and what bodies got may differ by this share.
+MOST_OFF = 0.01
 # No hammer takes so long for a blow [s].
 SLOWEST = 0.4
 # Entries of the ledger that put energy in.
@@ -147,6 +152,7 @@ def _about_blows(result: Result) -> Iterator[str]:
         )
     yield from _about_flight(result)
     yield from _about_supply(result)
+    yield from _about_oil(result)
     rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
     if _stands(result):
         yield "the bit does not turn: it meets its own craters, and the hole does not advance"
@@ -168,6 +174,30 @@ def _about_supply(result: Result) -> Iterator[str]:
             "the hammer is starved: the compressor gives too little air (pneumatic.supply_flow), "
             f"and the supply has fallen to {in_digits(found / 1e5)} bar, where "
             f"{in_digits(set_to / 1e5)} bar are set"
+        )
+
+
+def _about_oil(result: Result) -> Iterator[str]:
+    """Say that oil does what it should not."""
+    if result.scene.effects.drive != "hydraulic" or not result.end:
+        return
+    times = (result.end[f"hydraulic_{name}"] for name in ("void", "empty"))
+    void, empty = (time / result.duration for time in times)
+    if void > MOST_VOID:
+        yield (
+            f"oil cavitates in the rear chamber: for {in_digits(100.0 * void, 2)} % of the time it "
+            "is below the pressure of the surroundings"
+        )
+    oil, held = (result.end[f"hydraulic_{name}_work"] for name in ("oil", "held"))
+    if abs(oil - held) > MOST_OFF * abs(oil):
+        yield (
+            f"work on the piston is {in_digits(100.0 * (held / oil - 1.0), 2)} % off that of the "
+            "oil: forces are held too long (hydraulic.step; or bodies that are rigid)"
+        )
+    if empty > MOST_EMPTY:
+        yield (
+            f"the accumulator is empty for {in_digits(100.0 * empty, 2)} % of the time: the line "
+            "is below its precharge (hydraulic.precharge)"
         )
 
 

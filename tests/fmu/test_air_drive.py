@@ -1,4 +1,4 @@
-"""Hammers with air in their chambers through FMUs: what a driller sets, and what comes of it."""
+"""Hammers with air or oil in chambers through FMUs: what a driller sets, and what comes of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fmpy import read_model_description, simulate_fmu
 
 from fmu_src.hammer.build import build_hammer
 from percussion_model import Scene, Simulation
-from percussion_model.scene.hammers import with_air
+from percussion_model.scene.hammers import with_chambers
 
 STEP = 2.0**-9  # [s]
 # Pressure falls, percussion rests, and both come back; with water in the hole at last.
@@ -23,7 +23,7 @@ OUTPUTS = ("blow_frequency", "blow_energy", "blow_count", "hole_depth", "pneumat
 
 @pytest.fixture(scope="module")
 def scene():
-    return with_air("dth5", 24e5)
+    return with_chambers("dth5", 24e5)
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +89,35 @@ def test_pressure_and_percussion_act_on_the_chambers(
     assert frequency[2.0] == pytest.approx(frequency[0.5], rel=0.02)
     assert found["blow_energy"][-1] < 0.85 * found["blow_energy"][np.searchsorted(at, 2.0)]
     assert np.all(found["pneumatic.exhaust_pressure"][at > 2.1] > 5e5)
+
+
+OIL = ("blow_count", "hole_depth", "hydraulic.line_pressure", "hydraulic.used")
+
+
+def test_the_same_pressure_is_the_pumps_of_a_hammer_with_oil(write):
+    scene, step, end = with_chambers("hc25", 150e5, 1), 2.0**-8, 0.75
+    changes = {0.25: 80e5, 0.5: 0.0}  # percussion off at last
+    simulation, rows, signals = Simulation(scene), [], []
+    pressure, is_on = 150e5, True
+    for k in range(round(end / step)):
+        if k * step in changes:
+            simulation.set_inputs(hydraulic_supply_pressure=changes[k * step])
+            pressure, is_on = changes[k * step] or pressure, changes[k * step] > 0.0
+        signals.append((k * step, pressure, is_on))
+        simulation.advance((k + 1) * step)
+        rows.append(simulation.observe())
+    kinds = [("time", "f8"), ("supply_pressure", "f8"), ("percussion_on", "?")]
+    found = simulate_fmu(
+        str(write(scene, "2.0")), stop_time=end, step_size=step, output_interval=step,
+        output=list(OIL), input=np.array(signals, kinds),
+    )[1:]  # fmt: skip
+    for name in OIL[1:]:
+        here = np.array([row[name.replace(".", "_")] for row in rows])
+        np.testing.assert_array_equal(found[name], here, err_msg=name)
+    counts = found["blow_count"][np.searchsorted(found["time"], (0.25, 0.5, 0.625, 0.75))]
+    assert counts[0] > 12
+    assert 0.9 * counts[0] > counts[1] - counts[0] > 0.5 * counts[0]
+    assert counts[2] == counts[3]  # at rest
 
 
 def test_with_and_without_a_library_the_chambers_are_the_same(make):

@@ -17,6 +17,7 @@ from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.variables import INTERFACE, hammer_variables, split_drive_force
 from fmu_src.units import UNITS
 from percussion_model import Scene, SceneError, Section
+from percussion_model.components import DRIVES
 from percussion_model.scene.parameters import parameter_table
 
 NAMES = ["PercussiveHammer", "RigidHammer"]
@@ -117,7 +118,7 @@ def test_every_parameter_of_the_table_can_be_set():
             continue  # this scene has none: tests/fmu/test_top_hammer_fmu.py
         key = row.key.replace("*", "0")
         # what supply pressure stands for, in the pressure law times an area
-        by_pressure = ("drive.force", "pneumatic.supply_pressure")
+        by_pressure = ("drive.force", *(f"{one.name}.supply_pressure" for one in DRIVES))
         assert key in names or row.key in names or row.key in by_pressure, row.key
 
 

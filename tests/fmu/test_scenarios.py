@@ -14,7 +14,7 @@ import pytest
 
 from percussion_model import Scene, simulate
 from percussion_model.interface.commands.common import BAD_INPUT, INTERRUPTED
-from percussion_model.scene.hammers import with_air
+from percussion_model.scene.hammers import with_chambers
 from percussion_model.simulation.origin import ORIGIN
 from scenarios import (
     collaring_ramp,
@@ -154,7 +154,7 @@ def test_compressor_too_small(air_hammer, fmus, tmp_path):
     given = compressor_too_small.SHARE * ample["air"]
     assert small["air"] == pytest.approx(given, rel=0.01)
     for name, found in zip(("as much", "70 %"), (ample, small), strict=True):
-        scene = with_air("dth5", found["pressure"])
+        scene = with_chambers("dth5", found["pressure"])
         blows = simulate(scene, 2.0, settle=1.0).counted
         assert found["frequency"] == pytest.approx(1.0 / blows["period"].mean(), rel=0.01), name
         assert found["velocity"] == pytest.approx(blows["impact_velocity"].mean(), rel=0.01), name

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
     from percussion_model.simulation.result import Result
 
-_SUPPLY = "pneumatic.supply_pressure"
+# A key with the unit of a pressure.
+_PRESSURE = "pneumatic.supply_pressure"
 _NEW_TITLE = "A down-the-hole hammer"
 
 
@@ -238,7 +239,7 @@ def new(
         str | None,
         typer.Option(
             "--pressure",
-            help="Air in the chambers of a down-the-hole hammer, at a pressure as '24 bar'.",
+            help="Air or oil in the chambers of a hammer, at a pressure as '24 bar'.",
         ),
     ] = None,
     kind: Annotated[
@@ -250,7 +251,7 @@ def new(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write a commented scene to start from: the reference hammer, or another."""
-    from percussion_model.scene.hammers import bar_test, with_air
+    from percussion_model.scene.hammers import bar_test, with_chambers
     from percussion_model.scene.hammers import hammer as find
     from percussion_model.scene.parameters import read_number
     from percussion_model.scene.scene import Scene
@@ -263,11 +264,11 @@ def new(
             raise common.refusal("--kind hopkinson has no --hammer, no --rods and no --pressure")
         scene = bar_test()
     elif pressure is not None:
-        if hammer is None or rods is not None:
-            raise common.refusal("--pressure needs --hammer: one that works down the hole")
+        if hammer is None:
+            raise common.refusal("--pressure needs --hammer")
         if not has_unit(pressure):
             raise common.refusal(f"--pressure {pressure}: needs a unit, as in '24 bar'")
-        scene = with_air(hammer, read_number(_SUPPLY, pressure, "--pressure"))
+        scene = with_chambers(hammer, read_number(_PRESSURE, pressure, "--pressure"), rods)
     elif hammer is not None:
         scene = find(hammer, rods)
     elif rods is not None:

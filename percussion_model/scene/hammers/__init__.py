@@ -14,13 +14,14 @@ _HERE = Path(__file__).parent
 CHAMBER_FILES = _HERE / "chambers"
 # A top hammer has so many rods where nothing else is asked for.
 USUAL_RODS = 4
-# Hammers with air in their chambers, and whose chambers of `chambers` these are, by size.
-CHAMBERS = {
+# Hammers with air or oil in their chambers, and whose of `chambers` these are.
+AIR = {
     "dth3": "sandvik-3-5-inch",
     "dth4": "sandvik-4-inch",
     "dth5": "sandvik-5-inch",
     "dth6": "sandvik-6-inch",
 }
+CHAMBERS = {**AIR, "hc25": "montabert-hc-25", "t38": "cop-1838"}
 
 
 def hammers() -> list[str]:
@@ -59,33 +60,36 @@ def hammer(name: str, rods: int | None = None) -> Scene:
     return Scene(**{**tree, "title": title, "bars": [piston, shank, *[rod] * count, bit]})
 
 
-def with_air(name: str, pressure: float) -> Scene:
-    """Return the scene of a hammer that air drives, in chambers fitted to a catalogue.
+def with_chambers(name: str, pressure: float, rods: int | None = None) -> Scene:
+    """Return the scene of a hammer that air or oil drives, in chambers fitted to a catalogue.
 
-    With `effects.drive = "pressure"` it has the pressure law that stands for them.
+    With `effects.drive = "pressure"` it has the pressure law that stands for them; oil, its own.
 
     Parameters
     ----------
     name : str
         One of `CHAMBERS`.
     pressure : float
-        Of the supply at the hammer, above that of the surroundings [Pa].
+        Of air at the hammer, or the greatest of the pump, above that of the surroundings [Pa].
+    rods : int, optional
+        Of a top hammer.
 
     Raises
     ------
     SceneError
-        If the hammer has no chambers of air, or the pressure is out of bounds.
+        If the hammer has no chambers, or the pressure is out of bounds.
     """
-    scene = hammer(name)
+    scene = hammer(name, rods)
     if name not in CHAMBERS:
         raise SceneError(
-            f"hammer {name}: no chambers of air are known of it: there are those of "
-            f"{', '.join(CHAMBERS)}"
+            f"hammer {name}: no chambers are known of it: there are those of {', '.join(CHAMBERS)}"
         )
-    numbers = read_toml(CHAMBER_FILES / f"{CHAMBERS[name]}.toml")["pneumatic"]
-    changes = {f"pneumatic.{key}": value for key, value in numbers.items()}
-    changes["pneumatic.supply_pressure"] = pressure
-    return scene.replace(**{"effects.drive": "pneumatic", **_law(name, pressure), **changes})
+    drive = "pneumatic" if name in AIR else "hydraulic"
+    numbers = read_toml(CHAMBER_FILES / f"{CHAMBERS[name]}.toml")[drive]
+    changes = {f"{drive}.{key}": value for key, value in numbers.items()}
+    law = _law(name, pressure) if name in AIR else {}
+    changes |= {"effects.drive": drive, f"{drive}.supply_pressure": pressure, **law}
+    return scene.replace(**changes)
 
 
 def _law(name: str, pressure: float) -> dict[str, float]:
