@@ -31,8 +31,6 @@ from percussion_model.engine.platforms import PLATFORMS
 _KINDS = {"w": types.int64, "n": types.float64}
 # What an entry returns where memory ends: Fault.MEMORY.
 NO_MEMORY = 1
-# Numba finds the types of what a function calls within those of the function: fifty frames a call.
-DEEPEST = 5000
 # What the shell and the C library give.
 ALLOWED = frozenset(
     [
@@ -332,7 +330,6 @@ def write_objects(text: str, names: Iterable[str], platform: str, folder: Path) 
 def main(module: str, folder: str, *platforms: str) -> None:
     """Write the objects of a module's entries for platforms into a folder."""
     gc.disable()  # it would take a tenth of the time, and find nothing
-    sys.setrecursionlimit(DEEPEST)
     entries = exported_by(module)
     text = compile_entries(entries)
     for platform in platforms:

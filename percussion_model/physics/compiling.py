@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import inspect
 import logging
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,10 @@ CALLEES = ("physics", "components", "scene", "solvers", "verification/accuracy")
 PACKAGE = Path(__file__).parents[1]
 # None: beside the sources, or where NUMBA_CACHE_DIR says.
 FOLDER = kept_kernels.prepare(PACKAGE, CALLEES)
+# Numba finds the types of what a function calls within those of the function, fifty frames a call:
+# 1,000, as Python has them, are too few.
+DEEPEST = 5000
+sys.setrecursionlimit(max(sys.getrecursionlimit(), DEEPEST))
 _log = logging.getLogger("percussion_model")
 
 
