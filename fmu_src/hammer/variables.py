@@ -128,6 +128,13 @@ def start_pressure(scene: Scene) -> float:
     return scene[INPUTS[name].key] if name else split_drive_force(scene.drive.force)[0]
 
 
+def effective_area(scene: Scene) -> float:
+    """Area by which a pressure at the hammer makes the force of the pressure law [m2]."""
+    name = PRESSURES.get(scene.effects.drive)
+    pressure = scene[INPUTS[name].key] if name else 0.0
+    return scene.drive.force / pressure if pressure else split_drive_force(scene.drive.force)[1]
+
+
 def _inputs(scene: Scene) -> Iterator[Variable]:
     order = ["feed_force", "supply_pressure", "piston_force", "percussion_on"]
     order += [name for name in TABLE_INPUTS if name not in order]
@@ -192,7 +199,7 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
             continue
         if row.key not in replaced:
             yield _parameter(row.key, row, scene[row.key])
-    yield _number(AREA_ROW, split_drive_force(scene.drive.force)[1])
+    yield _number(AREA_ROW, effective_area(scene))
     carriers = gauge_bars(scene)
     bars = tuple((name, k + 1, f"the {name}") for k, name in enumerate(carriers))
     gauge = _parameter("gauge.bar", _choice_row("gauge.bar", carriers), "bit")

@@ -169,13 +169,23 @@ def jam_note(needed: float, stall: float) -> Iterator[str]:
         )
 
 
-def recoil_note(recoil: float, held: float) -> Iterator[str]:
-    """Say that the casing lifts off, where the recoil takes all that holds it [N]."""
+def recoil_note(recoil: float, held: float, by_law: bool) -> Iterator[str]:
+    """Say that the casing lifts off, where the recoil takes all that holds it [N].
+
+    Parameters
+    ----------
+    by_law : bool
+        Whether the drive is the pressure law, whose force the lifted casing lessens.
+    """
     if recoil * HELD > held:
+        then = (
+            "so the hammer lifts and has less than its full force"
+            if by_law
+            else "so a hammer would lift and lose force, which these chambers do not"
+        )
         yield (
             f"the feed does not hold the casing: the recoil takes all of the {1e-3 * held:.3g} kN "
-            "that press on it, so the hammer lifts and has less than its full force; more "
-            "feed.force holds it"
+            f"that press on it, {then}; more feed.force holds it"
         )
 
 

@@ -173,7 +173,8 @@ def _about_supply(result: Result) -> Iterator[str]:
         yield (
             "the hammer is starved: the compressor gives too little air (pneumatic.supply_flow), "
             f"and the supply has fallen to {in_digits(found / 1e5)} bar, where "
-            f"{in_digits(set_to / 1e5)} bar are set"
+            f"{in_digits(set_to / 1e5)} bar are set; while it still falls a longer run.duration "
+            "gives a lower rate"
         )
 
 
@@ -261,7 +262,8 @@ def _about_breaking(result: Result) -> Iterator[str]:
         held = scene.feed.force + scene.feed.casing_mass * gravity
         on_bit = (end["recoil_impulse"] - end["drive_impulse"]) / result.duration
         on_piston = float(blows["drive_impulse"].sum() / blows["period"].sum())
-        yield from recoil_note(on_piston + on_bit, held)
+        by_law = result.scene.effects.drive == "pressure"
+        yield from recoil_note(on_piston + on_bit, held, by_law)
     energy = by_volume(numbers_over(blows), scene.hole_diameter).get("specific_energy")
     if energy is not None and energy > 0.0 and (named := rock_of(scene)):
         strength = read_rock(named).strength

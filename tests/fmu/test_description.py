@@ -14,10 +14,16 @@ from lxml import etree
 
 from fmu_src.hammer.build import build_hammer
 from fmu_src.hammer.outputs import OUTPUTS
-from fmu_src.hammer.variables import INTERFACE, hammer_variables, split_drive_force
+from fmu_src.hammer.variables import (
+    INTERFACE,
+    effective_area,
+    hammer_variables,
+    split_drive_force,
+)
 from fmu_src.units import UNITS
 from percussion_model import Scene, SceneError, Section
 from percussion_model.components import DRIVES
+from percussion_model.scene.hammers import with_chambers
 from percussion_model.scene.parameters import parameter_table
 
 NAMES = ["PercussiveHammer", "RigidHammer"]
@@ -172,3 +178,9 @@ def test_a_name_that_is_no_identifier_is_refused(tmp_path):
     with pytest.raises(SceneError, match="letters, digits and underscores"):
         build_hammer(Scene(), tmp_path / "my-hammer.fmu")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("name", "pressure"), [("dth5", 18e5), ("hc25", 150e5)])
+def test_pressure_of_chambers_gives_the_law_its_force_where_a_host_chooses_it(name, pressure):
+    scene = with_chambers(name, pressure)
+    assert effective_area(scene) * pressure == pytest.approx(scene.drive.force, rel=1e-15)

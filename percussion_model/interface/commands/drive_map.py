@@ -60,10 +60,14 @@ def drive_map(
     from percussion_model.analysis.drive_map import REBOUNDS, SUPPLY
     from percussion_model.analysis.drive_map import drive_map as find
     from percussion_model.interface.progress import progress
+    from percussion_model.scene.units import has_unit
 
     common.check_file("--out", out)
     common.check_json(json_file)
     chosen = common.load_scene(scene, settings=settings, rock=rock, bit=bit)
+    parts = (pressures or "").replace(":", ",").split(",")
+    if pressures is not None and not any(has_unit(one.strip()) for one in parts):
+        raise common.refusal(f"--pressures {pressures}: give each value its unit, as 10bar,24bar")
     columns = _values("--pressures", SUPPLY, pressures)
     across = _values("--rebounds", "contact.restitution", rebounds) or REBOUNDS
     common.tell_of_compiling(chosen.solver_name, "rigid")
@@ -148,9 +152,8 @@ def about(found: DriveMap, feed: float) -> list[str]:
         "own": "by its own",
     }
     notes = [
-        "Errors of the law: left out, where it is made from the rows beside it; in rock, run in "
-        "place of the chambers in this scene. * is the rebound of its rock, with the law between "
-        "rows."
+        "Errors of the law. Left out: interpolated between the neighbouring rows. In rock: in "
+        "place of the chambers, in this scene. *: at the rebound of its rock, interpolated."
     ]
     if worst:
         told = (f"by up to {100.0 * worst[key]:.2g} % {where[key]}" for key in worst)
@@ -161,6 +164,6 @@ def about(found: DriveMap, feed: float) -> list[str]:
     if len(loose):
         notes.append(
             f"From {BAR * loose[0]:.3g} bar on the feed of {1e-3 * feed:.3g} kN is less than "
-            f"{HELD:g} F_0: by the law the bit may bounce that the gas of the lower chamber holds."
+            f"{HELD:g} F_0: by the law the bit may bounce, where gas would hold it down."
         )
     return notes
