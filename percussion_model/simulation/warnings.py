@@ -39,6 +39,9 @@ STARVED = 0.95
 # A rear chamber of oil is below the pressure around it for about 3 % of the time, as measured; an
 # accumulator is never empty.
 MOST_VOID, MOST_EMPTY = 0.1, 0.01
+# Oil at a mean pressure below this share of what its pump may have is too little: valves let some
+# out, and lines swing.
+FED = 0.6
 # Work that the oil has done and what bodies got may differ by this share.
 MOST_OFF = 0.01
 # No hammer takes so long for a blow [s].
@@ -182,6 +185,12 @@ def _about_oil(result: Result) -> Iterator[str]:
     """Say that oil does what it should not."""
     if result.scene.effects.drive != "hydraulic" or not result.end:
         return
+    set_to, found = result.scene["hydraulic.supply_pressure"], result.end["hydraulic_pressure"]
+    if 0.0 < found < FED * set_to:
+        yield (
+            "the hammer is starved: the pump gives too little oil (hydraulic.flow), at a mean of "
+            f"{in_digits(found / 1e5)} bar, where {in_digits(set_to / 1e5)} bar are set"
+        )
     times = (result.end[f"hydraulic_{name}"] for name in ("void", "empty"))
     void, empty = (time / result.duration for time in times)
     if void > MOST_VOID:

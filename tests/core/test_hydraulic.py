@@ -335,6 +335,7 @@ def test_a_saved_state_goes_on_to_the_same_bits():
 HARD = {
     "no flow": {"flow": 0.0},
     "no pressure": {"supply_pressure": 0.0},
+    "a third of the flow": {"flow": 3.6e-4},
     "400 bar": {"supply_pressure": 400e5},
     "an accumulator without oil": {"precharge": 300e5},
     "a spool that is stuck": {"pilot_port": 0.0},
@@ -374,6 +375,7 @@ ODD = {
     "an accumulator without oil": "the accumulator is empty for",
     "a wide lap": "oil cavitates in the rear chamber",
     "a spool that is stuck": "no whole blow",
+    "a third of the flow": "the hammer is starved",
 }
 
 
