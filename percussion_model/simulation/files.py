@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -190,3 +191,50 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value
+
+
+def damaged(path: Path, why: str) -> ResultError:
+    """What is said of a file that is cut off, or holds something else."""
+    return ResultError(f"{path}: not a complete result: {shortened(why)}")
+
+
+def read_csv(path: Path, convert: Callable[[str], float]) -> dict[str, Sequence[float]]:
+    """Columns of a table by their headings; all lines are whole."""
+    try:
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - 1))
+            end = file.read()
+        with path.open(encoding="utf-8", newline="") as file:
+            head, *lines = [*csv.reader(file)] or [[]]
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, csv.Error) as error:
+        raise damaged(path, reason(error)) from None
+    if not head:
+        raise damaged(path, "it is empty")
+    if end not in (b"\n", b"\r"):
+        raise damaged(path, "its last line is cut off")
+    rows = []
+    for k, line in enumerate(lines, 2):
+        if len(line) != len(head):
+            raise damaged(path, f"line {k} has {len(line)} of {len(head)} columns")
+        try:
+            rows.append([convert(text) for text in line])
+        except ValueError as error:
+            raise damaged(path, f"line {k}: {error}") from None
+    columns = list(zip(*rows, strict=True)) or [()] * len(head)
+    return dict(zip(head, columns, strict=True))
+
+
+def rows_of(path: Path, columns: dict[str, Sequence[float]], dtype: np.dtype) -> np.ndarray:
+    """Rows of a table by its columns, which a file has."""
+    names = dtype.names or ()
+    if missing := [name for name in names if name not in columns]:
+        raise damaged(path, f"has no column {missing[0]}")
+    rows = np.zeros(len(columns[names[0]]), dtype)
+    for name in names:
+        try:
+            rows[name] = columns[name]
+        except (ValueError, OverflowError) as error:  # no whole number, or too large a one
+            raise damaged(path, f"column {name}: {error}") from None
+    return rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -22,10 +22,13 @@ from percussion_model.simulation.files import (
     LARGEST_TABLE,
     LARGEST_TEXT,
     ResultError,
+    damaged,
     load_arrays,
     plain,
+    read_csv,
     reason,
     refuse_large,
+    rows_of,
     staged,
     to_json,
 )
@@ -454,22 +457,17 @@ def _read_result(folder: Path) -> dict[str, Any]:
         refuse_large(folder / name, LARGEST_TEXT if name == "summary.json" else LARGEST_TABLE)
     scene = _read_scene(folder / "scene.toml")
     summary, fields = _read_summary(folder / "summary.json")
-    blows = _read_csv(folder / "blows.csv", float)
+    blows = read_csv(folder / "blows.csv", float)
     if not set(blows) >= _HOLE:
         fields["warnings"].append(_NO_HOLE)
         blows |= dict.fromkeys(_HOLE, [math.nan] * len(next(iter(blows.values()))))
-    tables = {"blows": _rows(folder / "blows.csv", blows, BLOW)}
+    tables = {"blows": rows_of(folder / "blows.csv", blows, BLOW)}
     count = summary.get("blows")
     if count is not None and count != len(tables["blows"]):
-        raise _damaged(folder / "blows.csv", f"has {len(tables['blows'])} of {count} blows")
-    events = _read_csv(folder / "events.csv", _number_or_kind)
-    tables["events"] = _rows(folder / "events.csv", events, EVENT)
+        raise damaged(folder / "blows.csv", f"has {len(tables['blows'])} of {count} blows")
+    events = read_csv(folder / "events.csv", _number_or_kind)
+    tables["events"] = rows_of(folder / "events.csv", events, EVENT)
     return {"scene": scene, **fields, **tables, "trace": _read_trace(folder)}
-
-
-def _damaged(path: Path, why: str) -> ResultError:
-    """What is said of a file that is cut off, or holds something else."""
-    return ResultError(f"{path}: not a complete result: {shortened(why)}")
 
 
 def _read_scene(path: Path) -> Scene:
@@ -477,7 +475,7 @@ def _read_scene(path: Path) -> Scene:
     run = read_toml(path).get("run")
     missing = [key for key in _LAST if not isinstance(run, dict) or key not in run]
     if missing:
-        raise _damaged(path, f"has no run.{missing[0]}")
+        raise damaged(path, f"has no run.{missing[0]}")
     return Scene.from_toml(path)
 
 
@@ -488,16 +486,16 @@ def _read_summary(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     except OSError as error:
         raise ResultError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        raise _damaged(path, f"no JSON: {reason(error)}") from None
+        raise damaged(path, f"no JSON: {reason(error)}") from None
     if not isinstance(summary, dict):
-        raise _damaged(path, "no table of names and values")
+        raise damaged(path, "no table of names and values")
     fields = {}
     for name, (kind, allowed) in _FROM_SUMMARY.items():
         if name not in summary and name not in _LATER:
-            raise _damaged(path, f"has no {name}")
+            raise damaged(path, f"has no {name}")
         fields[name] = value = summary.get(name, _LATER.get(name))
         if not kind(value):
-            raise _damaged(path, f"{name} = {shortened(repr(value))}: must be {allowed}")
+            raise damaged(path, f"{name} = {shortened(repr(value))}: must be {allowed}")
     for name in ("energy", "end", "errors", "cells"):
         given = fields[name] or {}
         fields[name] = {key: math.nan if one is None else one for key, one in given.items()}
@@ -557,59 +555,18 @@ def _number_or_kind(text: str) -> float:
     return float(text) if kind is None else float(kind)
 
 
-def _read_csv(path: Path, convert: Callable[[str], float]) -> dict[str, Sequence[float]]:
-    """Columns of a table by their headings; all lines are whole."""
-    try:
-        with path.open("rb") as file:
-            file.seek(max(0, path.stat().st_size - 1))
-            end = file.read()
-        with path.open(encoding="utf-8", newline="") as file:
-            head, *lines = [*csv.reader(file)] or [[]]
-    except OSError as error:
-        raise ResultError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, csv.Error) as error:
-        raise _damaged(path, reason(error)) from None
-    if not head:
-        raise _damaged(path, "it is empty")
-    if end not in (b"\n", b"\r"):
-        raise _damaged(path, "its last line is cut off")
-    rows = []
-    for k, line in enumerate(lines, 2):
-        if len(line) != len(head):
-            raise _damaged(path, f"line {k} has {len(line)} of {len(head)} columns")
-        try:
-            rows.append([convert(text) for text in line])
-        except ValueError as error:
-            raise _damaged(path, f"line {k}: {error}") from None
-    columns = list(zip(*rows, strict=True)) or [()] * len(head)
-    return dict(zip(head, columns, strict=True))
-
-
-def _rows(path: Path, columns: dict[str, Sequence[float]], dtype: np.dtype) -> np.ndarray:
-    names = dtype.names or ()
-    if missing := [name for name in names if name not in columns]:
-        raise _damaged(path, f"has no column {missing[0]}")
-    rows = np.zeros(len(columns[names[0]]), dtype)
-    for name in names:
-        try:
-            rows[name] = columns[name]
-        except (ValueError, OverflowError) as error:  # no whole number, or too large a one
-            raise _damaged(path, f"column {name}: {error}") from None
-    return rows
-
-
 def _read_trace(folder: Path) -> dict[str, np.ndarray] | None:
     path = folder / "trace.npz"
     if path.exists():
         trace = load_arrays(path)
     elif (path := folder / "trace.csv").exists():
-        columns = _read_csv(path, float)
+        columns = read_csv(path, float)
         trace = {name: np.array(column) for name, column in columns.items()}
     else:
         return None
     if "time" not in trace:
-        raise _damaged(path, "has no column time")
+        raise damaged(path, "has no column time")
     for name, values in trace.items():
         if values.shape != trace["time"].shape or values.ndim != 1 or values.dtype.kind != "f":
-            raise _damaged(path, f"column {name} is not one of numbers, as many as times")
+            raise damaged(path, f"column {name} is not one of numbers, as many as times")
     return trace
