@@ -65,6 +65,9 @@ def fmi_unit(unit: str) -> str:
         Where it is not.
     """
     name = unit.replace("^", "").replace(" ", ".") if unit not in ("", "-") else "1"
+    above, *below = name.split("/")
+    if len(below) > 1:  # which FMI writes as one divisor
+        name = f"{above}/({'.'.join(below)})"
     if name not in UNITS:
         UNITS[name] = Unit(_exponents(name), {})
     return name

@@ -547,7 +547,7 @@ COMPONENT = Component(
         "valve_width": (70e-3, "m", "length of the edges that the spool opens", 1e-6, 10.0),
         "valve_lap": (0.0, "m", "way of the spool to either side of its middle in which it "
                       "closes both ports", 0.0, 0.1),
-        "leak": (1.36e-12, "m^3/(s Pa)", "leakage of the line to the tank, by the difference of "
+        "leak": (1.36e-12, "m^3/s/Pa", "leakage of the line to the tank, by the difference of "
                  "their pressures; the same of the rear chamber", 0.0, 1e-6),
         "gas_volume": (0.2e-3, "m^3", "gas of the accumulator without oil", 1e-6, 1.0),
         "precharge": (60e5, "Pa", "its pressure then, absolute", 1e3, 1e8),

@@ -70,7 +70,9 @@ QUANTITIES = {
     "kg/m^3": Quantity(
         "a density", ("7850", "7.85 g/cm^3", "490.1 lb/ft^3"), ("g/cm^3", "t/m^3", "lb/ft^3")
     ),
-    "Pa": Quantity("a stress", ("2.1e11", "210 GPa", "30.46 Mpsi"), ("GPa", "MPa", "kPa", "psi")),
+    "Pa": Quantity(
+        "a pressure or stress", ("2.4e6", "24 bar", "348.1 psi"), ("bar", "MPa", "GPa", "psi")
+    ),
     "N/m": Quantity(
         "a stiffness", ("1e8", "100 kN/mm", "571 klbf/in"), ("GN/m", "kN/mm", "MN/m", "N/mm")
     ),
@@ -81,6 +83,8 @@ QUANTITIES = {
     "rad/s": Quantity("a speed of rotation", ("5.655", "54 rpm"), ("rpm", "deg/s")),
     "N m": Quantity("a torque", ("600", "0.6 kN m", "442.5 ft lbf"), ("kN m", "ft lbf")),
     "m^3": Quantity("a volume", ("5e-6", "5 cm^3"), ("cm^3", "l", "in^3")),
+    "m^3/s": Quantity("a flow", ("0.001", "60 l/min"), ("l/min", "m^3/min", "cm^3/s")),
+    "m^3/s/Pa": Quantity("a leakage", ("1.5e-12", "1.5 cm^3/s/MPa"), ("cm^3/s/MPa", "l/min/bar")),
     "J/m^3": Quantity("an energy by volume", ("5.5e7", "55 MJ/m^3"), ("MJ/m^3", "J/cm^3")),
     "kg/s": Quantity("a mass flow", ("0.45", "27 kg/min"), ("kg/min", "g/s", "lb/min")),
     "K": Quantity("a temperature", ("300", "300000 mK"), ("mK",)),

@@ -83,7 +83,16 @@ AIR: dict[str, tuple[Any, ...]] = {
     "pneumatic.ramp": (1e-6, 1e-2),
     "pneumatic.wall_conductance": (1e-3, 1e3, ZERO),
 }
-BOUNDS = WIDE | ADVANCE | AIR
+# Of chambers of oil, drawn after that.
+OIL: dict[str, tuple[Any, ...]] = {
+    "hydraulic.flow": (1e-5, 1e-2, ZERO),
+    "hydraulic.supply_pressure": (1e5, 5e7, ZERO),
+    "hydraulic.rear_volume": (1e-6, 1e-3),
+    "hydraulic.spool_mass": (1e-3, 10.0),
+    "hydraulic.air": (1e-5, 0.3, ZERO),
+    "hydraulic.precharge": (1e5, 5e7),
+}
+BOUNDS = WIDE | ADVANCE | AIR | OIL
 SWITCHES = ("effects.breaking", "effects.rotation")
 # What a scene with breaking or rotation has to be given.
 NO_DEFAULT = ("hole_diameter", "breaking.buttons", "rotation.mean_radius")
@@ -202,7 +211,7 @@ def draw_case(source: Source, reaches: tuple[str, ...] = ("near", "wide", "wide"
     scene = scene.replace(**{"run.duration": min(max(length, 1e-300), 1e6), "run.settle": 0.0})
     calls = draw_calls(source, scene, reach)
     scene = with_advance(source, scene, reach)
-    if scene.effects.drive == "pneumatic":  # drawn last, so that inputs of its like are void
+    if scene.effects.drive in ("pneumatic", "hydraulic"):  # drawn last: inputs of its like are void
         calls = [call for call in calls if call[1] not in ("inputs", "detour")]
     if scene.effects.rotation and chance(source, 50):
         speed = number(source, "rotation.speed", reach)
@@ -276,8 +285,15 @@ def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
         value = number(source, key, reach)
         if value is not None:
             changes[key] = value
-    if scene.effects.drive == "pressure" and chance(source, 20):
+    is_law = scene.effects.drive == "pressure"
+    if is_law and chance(source, 20):
         changes["effects.drive"] = "pneumatic"
+    for key in OIL:
+        value = number(source, key, reach)
+        if value is not None:
+            changes[key] = value
+    if is_law and "effects.drive" not in changes and chance(source, 20):
+        changes["effects.drive"] = "hydraulic"
     return scene.replace(**changes)
 
 
