@@ -16,7 +16,7 @@ import math
 from typing import NamedTuple
 
 from percussion_model.components import Component
-from percussion_model.physics.chambers import Way
+from percussion_model.physics.chambers import Way, is_past, straight_slope
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 from percussion_model.physics.oil import (
     REFERENCE,
@@ -53,8 +53,6 @@ BAND = 0.1
 BEFORE = 5e-8
 # A way foretold to this is the real one but for the work of the difference [m].
 NEAR = 1e-5
-# A piston that is faster or slower by this than was foretold has met something [m/s].
-JUMP = 1.0
 # Nothing has been done yet.
 NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 # Piston and bit meet no faster than this, or than the piston with a bit that bounces [m/s].
@@ -439,22 +437,9 @@ def foretell(par, s, span):
     # a force that goes straight with the impulse and the way of the one foretold
     slope = 0.0
     if s.closed == 0:
-        moment = d * then.impulse + par.mass_p * (then.x - x - d * v + 0.5 * d * d * par.gravity)
-        slope = 12.0 * moment / (d * d * d) - 6.0 * then.impulse / (d * d)
+        slope = straight_slope(par, then.impulse, then.x - x - d * v, d)
     s.hydraulic_slope = slope
     s.hydraulic_base = (then.impulse + s.hydraulic_owed) / d - 0.5 * slope * d
-
-
-@inlined
-def is_over(s):
-    """Whether the oil has to be foretold anew."""
-    since, span = s.hydraulic_since, s.hydraulic_span
-    if span == 0.0 or since >= (1.0 - 1e-9) * span or s.closed != s.hydraulic_touched:
-        return True
-    if s.closed == 1:
-        return False
-    expected = s.hydraulic_from_v + (s.hydraulic_then_v - s.hydraulic_from_v) * since / span
-    return abs(s.v_p - expected) > JUMP
 
 
 @inlined
@@ -472,11 +457,13 @@ def lasts(par, s):
 @kernel
 def renew(par, s, h):
     """Foretell the oil where that is needed, for no less than a time."""
-    if not is_over(s):
+    since, span = s.hydraulic_since, s.hydraulic_span
+    from_v, then_v = s.hydraulic_from_v, s.hydraulic_then_v
+    if not is_past(s, since, span, s.hydraulic_touched, from_v, then_v):
         return
     if s.hydraulic_filling_s == 0.0:
         keep_oil(par, s, filled(par, pump_of(s), -s.u_r))
-    elif s.hydraulic_since > 0.0:
+    elif since > 0.0:
         settle(par, s)
     # what is asked for less is held on in steps, at whose end the time is over
     foretell(par, s, max(math.floor(lasts(par, s) / h), 1.0) * h)

@@ -22,15 +22,17 @@ from percussion_model.physics.chambers import (
     Gas,
     Way,
     go,
+    is_past,
     size_of_lower,
     size_of_upper,
     started,
+    straight_slope,
 )
 from percussion_model.physics.gas import AIR, RATIO
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Where piston and bit touch, or may, gas is foretold for this share of the usual time.
-SHORTEST, TOUCHING = 0.05, 0.05
+SHORTEST = 0.05
 # In flight for so many times that, in steps of it.
 LONGEST = 2.0
 # No volume is empty at the start [Pa].
@@ -41,8 +43,6 @@ NEAR = 1e-5
 OFF, AGAIN = 1.5e-8, 0.2
 # Over less than this share of a step a velocity of the bit may be that of ringing alone.
 RINGS = 0.3
-# A piston that is faster or slower by this than was foretold has met something [m/s].
-JUMP = 1.0
 # A bit that bounces comes to the piston no faster than this [m/s].
 BOUNCE = 5.0
 
@@ -230,23 +230,10 @@ def foretell(par, s, span):
     # a force that goes straight with the impulse and the way of the one foretold
     impulse, slope = done.impulse, 0.0
     if s.closed == 0:
-        moment = d * impulse + par.mass_p * (then.x - x - d * v + 0.5 * d * d * par.gravity)
-        slope = 12.0 * moment / (d * d * d) - 6.0 * impulse / (d * d)
+        slope = straight_slope(par, impulse, then.x - x - d * v, d)
     s.pneumatic_slope = slope
     s.pneumatic_base = (impulse + s.pneumatic_owed) / d - 0.5 * slope * d
     s.pneumatic_mean_on_bit = (done.on_bit + s.pneumatic_owed_bit) / d
-
-
-@inlined
-def is_over(s):
-    """Whether the gas has to be foretold anew."""
-    since, span = s.pneumatic_since, s.pneumatic_span
-    if span == 0.0 or since >= (1.0 - 1e-9) * span or s.closed != s.pneumatic_touched:
-        return True
-    if s.closed == 1:
-        return False
-    expected = s.pneumatic_from_v + (s.pneumatic_then_v - s.pneumatic_from_v) * since / span
-    return abs(s.v_p - expected) > JUMP
 
 
 @inlined
@@ -254,7 +241,7 @@ def lasts(par, s):
     """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
     shortest, meet = SHORTEST * par.pneumatic_step, -s.u_r / max(s.v_p - s.v_b, BOUNCE)
     if s.closed == 1:
-        return TOUCHING * par.pneumatic_step
+        return shortest
     most = min(max(s.pneumatic_reach, AGAIN * par.pneumatic_step), LONGEST * par.pneumatic_step)
     return min(max(meet, shortest), most)
 
@@ -262,12 +249,14 @@ def lasts(par, s):
 @kernel
 def renew(par, s, h):
     """Foretell the gas where that is needed, for no less than a time."""
-    if not is_over(s):
+    since, span = s.pneumatic_since, s.pneumatic_span
+    from_v, then_v = s.pneumatic_from_v, s.pneumatic_then_v
+    if not is_past(s, since, span, s.pneumatic_touched, from_v, then_v):
         return
     if s.pneumatic_mass_u == 0.0:
         keep_gas(par, s, open_air(par, outside(par, s), -s.u_r))
         s.pneumatic_supply = set_pressure(par, s)
-    elif s.pneumatic_since > 0.0:
+    elif since > 0.0:
         settle(par, s)
     # what is asked for less is held on in steps, in which a bit that bounces may be anywhere
     is_whole = h >= 0.5 * SHORTEST * par.pneumatic_step

@@ -25,6 +25,8 @@ MOST_STEPS = 20_000
 LEAST_SHARE, STOP = 1e-2, 1e8
 # Steps are short by how fast a chamber shrinks, and by how fast a piston swings on its gas.
 SHRINKS, SWINGS = 2.0, 3.0
+# A piston that is faster or slower by this than was foretold has met something [m/s].
+JUMP = 1.0
 # Friction has its full value from some times this speed on [m/s].
 CREEP = 1e-2
 
@@ -212,6 +214,43 @@ class Way(NamedTuple):
 def flight(span):
     """Way of a piston that flies for a time."""
     return Way(False, 0.0, 0.0, 0.0, 0.0, span)
+
+
+@inlined
+def straight_slope(par, impulse, beyond, d):
+    """Slope of a force that goes straight, by its impulse and the way that it makes [N/s].
+
+    Parameters
+    ----------
+    impulse : float
+        On the piston, down [N s].
+    beyond : float
+        How far the piston has come up beyond what its velocity alone makes [m].
+    d : float
+        Time of both [s].
+    """
+    moment = d * impulse + par.mass_p * (beyond + 0.5 * d * d * par.gravity)
+    return 12.0 * moment / (d * d * d) - 6.0 * impulse / (d * d)
+
+
+@inlined
+def is_past(s, since, span, touched, from_v, then_v):
+    """Whether a time that was foretold is over, or the piston has met something since.
+
+    Parameters
+    ----------
+    since, span : float
+        How much of the time has passed, and all of it [s].
+    touched : float
+        `closed` when it was foretold.
+    from_v, then_v : float
+        Velocity of the piston then, and that foretold for the end [m/s].
+    """
+    if span == 0.0 or since >= (1.0 - 1e-9) * span or s.closed != touched:
+        return True
+    if s.closed == 1:
+        return False
+    return abs(s.v_p - (from_v + (then_v - from_v) * since / span)) > JUMP
 
 
 @inlined
