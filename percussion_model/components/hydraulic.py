@@ -398,7 +398,7 @@ def settle(par, s):
     moves on.
     """
     h, x, before, v_p = s.hydraulic_since, -s.u_r, s.hydraulic_from_x, s.hydraulic_last_v
-    casing = (x - before) / h + 0.5 * (s.hydraulic_from_v + v_p)
+    casing = (x - before + s.path_p - s.hydraulic_from_path) / h
     then, off = foretold(s), 0.0
     way = Way(True, before, casing - s.hydraulic_from_v, x, casing - v_p, h)
     if abs(h - s.hydraulic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
@@ -409,6 +409,7 @@ def settle(par, s):
     keep_oil(par, s, then)
     # the bodies part from what was foretold as t^2: the mean of F by t, which moments tell
     s.hydraulic_oil_work -= (then.impulse / h + s.hydraulic_slope * h / 6.0) * off
+    s.hydraulic_oil_work += casing * then.impulse
     s.hydraulic_owed += then.impulse - s.hydraulic_pushed
     s.hydraulic_pushed = 0.0
     s.hydraulic_held_work = s.hydraulic_pushed_work
@@ -426,7 +427,8 @@ def foretell(par, s, span):
     """Foretell the oil, and the force that it will have."""
     x, v, d = -s.u_r, s.hydraulic_casing_velocity - s.v_p, span
     s.hydraulic_from_x, s.hydraulic_from_v = x, s.v_p
-    s.hydraulic_touched, s.hydraulic_last_u = s.closed, s.u_r
+    s.hydraulic_touched = s.closed
+    s.hydraulic_from_path = s.hydraulic_last_path = s.path_p
     # a piston that touches the bit goes on as it has gone
     bend = -s.hydraulic_pull if s.closed == 1 else 0.0
     way = Way(s.closed == 1, x, v, x + d * (v + 0.5 * bend * d), v + bend * d, d)
@@ -443,8 +445,18 @@ def foretell(par, s, span):
 
 
 @inlined
+def is_over(s):
+    """Whether what was foretold is to be made out."""
+    since, span = s.hydraulic_since, s.hydraulic_span
+    from_v, then_v = s.hydraulic_from_v, s.hydraulic_then_v
+    return is_past(s, since, span, s.hydraulic_touched, from_v, then_v)
+
+
+@inlined
 def lasts(par, s):
     """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
+    if not is_over(s):
+        return s.hydraulic_span - s.hydraulic_since
     shortest, longest = SHORTEST * par.hydraulic_step, par.hydraulic_step
     if 0.0 < s.hydraulic_spool < par.hydraulic_spool_stroke:
         longest *= SWITCHING
@@ -457,13 +469,11 @@ def lasts(par, s):
 @kernel
 def renew(par, s, h):
     """Foretell the oil where that is needed, for no less than a time."""
-    since, span = s.hydraulic_since, s.hydraulic_span
-    from_v, then_v = s.hydraulic_from_v, s.hydraulic_then_v
-    if not is_past(s, since, span, s.hydraulic_touched, from_v, then_v):
+    if not is_over(s):
         return
     if s.hydraulic_filling_s == 0.0:
         keep_oil(par, s, filled(par, pump_of(s), -s.u_r))
-    elif since > 0.0:
+    elif s.hydraulic_since > 0.0:
         settle(par, s)
     # what is asked for less is held on in steps, at whose end the time is over
     foretell(par, s, max(math.floor(lasts(par, s) / h), 1.0) * h)
@@ -480,8 +490,8 @@ def on_piston(par, s, h):
 def pass_time(par, s, h):
     """Note what was given for h."""
     s.hydraulic_pushed += s.f_hydraulic_piston * h
-    s.hydraulic_pushed_work += s.f_hydraulic_piston * (s.u_r - s.hydraulic_last_u)
-    s.hydraulic_last_u, s.hydraulic_last_v = s.u_r, s.v_p
+    s.hydraulic_pushed_work += s.f_hydraulic_piston * (s.path_p - s.hydraulic_last_path)
+    s.hydraulic_last_path, s.hydraulic_last_v = s.path_p, s.v_p
     s.hydraulic_since += h
     if -s.u_r > par.hydraulic_pilot_supply_edge:
         s.armed = 1
@@ -569,7 +579,7 @@ COMPONENT = Component(
         "pump_work": ("J", "work of the pump since the start", 0.0),
         "void": ("s", "time in which the rear chamber was below the pressure around it", 0.0),
         "empty": ("s", "time in which the accumulator held no oil", 0.0),
-        "oil_work": ("J", "work of the oil on the piston, relative to the casing, by the oil", 0.0),
+        "oil_work": ("J", "work of the oil on the piston, by the oil", 0.0),
         "held_work": ("J", "the same by the forces that solvers took", 0.0),
     },
     hidden=(
@@ -577,7 +587,7 @@ COMPONENT = Component(
         *(f"then_{name}" for name in ("x", "v", "spool", "speed", "r", "s", "neck", "gas",
                                       "impulse", "work", "used", "given", "void", "empty")),
         "from_x", "from_v", "casing_velocity", "casing_mean", "restless", "touched", "span",
-        "since", "base", "slope", "pushed", "pushed_work", "owed", "pull", "last_u", "last_v",
+        "since", "base", "slope", "pushed", "pushed_work", "owed", "pull", "from_path", "last_path", "last_v",
         "used_before", "work_before",
     ),
     pass_time=pass_time,

@@ -32,15 +32,17 @@ from percussion_model.physics.gas import AIR, RATIO
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Where piston and bit touch, or may, gas is foretold for this share of the usual time.
-SHORTEST = 0.05
+SHORTEST = 0.1
 # In flight for so many times that, in steps of it.
 LONGEST = 2.0
 # No volume is empty at the start [Pa].
 LEAST_PRESSURE = 100.0
 # A way foretold to this is the real one but for the work of the difference [m].
-NEAR = 1e-5
+NEAR = 1e-4
 # A bit that goes elsewhere than was foretold makes times shorter, by how far times the time [m s].
-OFF, AGAIN = 1.5e-8, 0.2
+OFF, AGAIN = 1e-8, 0.2
+# Steps of the bit's load, which make it ring, are below this share of the full pressure's.
+STEADY = 0.05
 # Over less than this share of a step a velocity of the bit may be that of ringing alone.
 RINGS = 0.3
 # A bit that bounces comes to the piston no faster than this [m/s].
@@ -117,23 +119,23 @@ def feed_supply(par, s, used, h):
 
 
 @inlined
-def corrected(par, s, then, x):
+def corrected(par, s, then, before, x):
     """What was foretold, with the work that a way which is not quite as foretold makes of it."""
     gas, off = then.gas, x - then.x
     p_u = (RATIO - 1.0) * gas.energy_u / size_of_upper(par, then.x)
     p_l = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, then.x)
-    up, down = p_u * par.pneumatic_upper_area * off, p_l * par.pneumatic_lower_area * off
-    given = p_l * (size_of_lower(par, x) - size_of_lower(par, then.x))
-    # off by a part that grows in time
-    by_u = RATIO * up * par.pneumatic_upper_area / size_of_upper(par, then.x)
-    by_l = RATIO * down * par.pneumatic_lower_area / size_of_lower(par, then.x)
+    # forces go straight on with the way, off by a part that grows in time
+    by_u = RATIO * p_u * par.pneumatic_upper_area**2 / size_of_upper(par, then.x) * off
+    by_l = RATIO * p_l * par.pneumatic_lower_area**2 / size_of_lower(par, then.x) * off
+    up = (p_u * par.pneumatic_upper_area + 0.5 * by_u) * off
+    down = (p_l * par.pneumatic_lower_area - 0.5 * by_l) * off
+    given = down if then.x >= 0.0 and x >= 0.0 else 0.0
     half = 0.5 * s.pneumatic_span
     gas = Gas(
         gas.mass_u, gas.energy_u + up, gas.mass_l, gas.energy_l - given, gas.mass_x, gas.energy_x
     )
-    force = (
-        up - down - outside(par, s) * (par.pneumatic_upper_area - par.pneumatic_lower_area) * off
-    )
+    mean, by = then.done.impulse / s.pneumatic_span, by_u + by_l
+    force = mean * off + 0.5 * by * (x - before)
     done = then.done
     done = Done(
         done.used,
@@ -170,6 +172,13 @@ def foretold(s):
     return Ahead(gas, s.pneumatic_then_x, s.pneumatic_then_v, done, 0.0)
 
 
+@inlined
+def summed(total, more):
+    """Sum, and what of it rounding loses: an hour of drilling adds up 1e7 small numbers."""
+    new = total + more
+    return new, more - (new - total)
+
+
 @kernel
 def settle(par, s):
     """Make out the gas on the way that was gone since it was foretold.
@@ -178,12 +187,14 @@ def settle(par, s):
     piston's last is that before it met something.
     """
     h, x, before, v_p = s.pneumatic_since, -s.u_r, s.pneumatic_from_x, s.pneumatic_last_v
-    bit = (x - before) / h + 0.5 * (s.pneumatic_from_v + v_p)
+    bit = (x - before + s.path_p - s.pneumatic_from_path) / h
     then = foretold(s)
     far = max(abs(x - then.x) * h, LEAST_DIVISOR)
-    s.pneumatic_reach = h * min(math.sqrt(OFF / far), 2.0) if s.closed == 0 else 0.0
+    steady = STEADY * par.pneumatic_lower_area * set_pressure(par, s)
+    steady /= max(abs(s.pneumatic_load_change), LEAST_DIVISOR)
+    s.pneumatic_reach = h * min(math.sqrt(OFF / far), steady, 2.0) if s.closed == 0 else 0.0
     if abs(h - s.pneumatic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
-        then = corrected(par, s, then, x)
+        then = corrected(par, s, then, before, x)
     else:
         way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h)
         then = go(
@@ -195,14 +206,24 @@ def settle(par, s):
     s.pneumatic_owed += done.impulse - s.pneumatic_given
     s.pneumatic_owed_bit += done.on_bit - s.pneumatic_given_bit
     s.pneumatic_given = s.pneumatic_given_bit = 0.0
-    s.pneumatic_consumed += done.used
-    s.pneumatic_vented += done.vented
-    s.pneumatic_brought += done.brought
-    s.pneumatic_expanded += done.expanded
-    s.pneumatic_gas_work += done.work
+    s.pneumatic_consumed, s.pneumatic_rest_used = summed(
+        s.pneumatic_consumed, s.pneumatic_rest_used + done.used
+    )
+    s.pneumatic_vented, s.pneumatic_rest_vented = summed(
+        s.pneumatic_vented, s.pneumatic_rest_vented + done.vented
+    )
+    s.pneumatic_brought, s.pneumatic_rest_brought = summed(
+        s.pneumatic_brought, s.pneumatic_rest_brought + done.brought
+    )
+    s.pneumatic_expanded, s.pneumatic_rest_expanded = summed(
+        s.pneumatic_expanded, s.pneumatic_rest_expanded + done.expanded
+    )
+    s.pneumatic_gas_work += done.work + bit * done.impulse
     s.pneumatic_held_work = s.pneumatic_given_work
     share = min(h / (RINGS * par.pneumatic_step), 1.0)
     s.pneumatic_bit_velocity += share * (bit - s.pneumatic_bit_velocity)
+    pressed = s.v_b - s.v_p - s.pneumatic_from_u
+    s.pneumatic_pull = pressed / h if s.pneumatic_touched == 1.0 else 0.0
     s.pneumatic_span = s.pneumatic_since = 0.0
 
 
@@ -211,12 +232,14 @@ def foretell(par, s, span):
     """Foretell the gas, and the forces that it will have."""
     x, v, d = -s.u_r, s.pneumatic_bit_velocity - s.v_p, span
     s.pneumatic_from_x, s.pneumatic_from_v = x, s.v_p
-    s.pneumatic_touched, s.pneumatic_last_u = s.closed, s.u_r
+    s.pneumatic_touched = s.closed
+    s.pneumatic_from_path = s.pneumatic_last_path = s.path_p
     y = started(present_gas(s), x, v)
-    u = s.v_b - s.v_p  # at which a piston that touches the bit goes on
-    then = go(
-        par, s.pneumatic_supply, outside(par, s), y, Way(s.closed == 1, x, u, x + u * d, u, d)
-    )
+    # a piston that touches the bit goes on as it has gone
+    u, pull = s.v_b - s.v_p, s.pneumatic_pull if s.closed == 1 else 0.0
+    s.pneumatic_from_u = u
+    way = Way(s.closed == 1, x, u, x + d * (u + 0.5 * pull * d), u + pull * d, d)
+    then = go(par, s.pneumatic_supply, outside(par, s), y, way)
     s.pneumatic_span, s.pneumatic_since = span, 0.0
     s.pneumatic_then_mass_u, s.pneumatic_then_energy_u = then.gas.mass_u, then.gas.energy_u
     s.pneumatic_then_mass_l, s.pneumatic_then_energy_l = then.gas.mass_l, then.gas.energy_l
@@ -233,12 +256,24 @@ def foretell(par, s, span):
         slope = straight_slope(par, impulse, then.x - x - d * v, d)
     s.pneumatic_slope = slope
     s.pneumatic_base = (impulse + s.pneumatic_owed) / d - 0.5 * slope * d
-    s.pneumatic_mean_on_bit = (done.on_bit + s.pneumatic_owed_bit) / d
+    on_bit = (done.on_bit + s.pneumatic_owed_bit) / d
+    s.pneumatic_load_change = on_bit - s.pneumatic_mean_on_bit
+    s.pneumatic_mean_on_bit = on_bit
+
+
+@inlined
+def is_over(s):
+    """Whether what was foretold is to be made out."""
+    since, span = s.pneumatic_since, s.pneumatic_span
+    from_v, then_v = s.pneumatic_from_v, s.pneumatic_then_v
+    return is_past(s, since, span, s.pneumatic_touched, from_v, then_v)
 
 
 @inlined
 def lasts(par, s):
     """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
+    if not is_over(s):
+        return s.pneumatic_span - s.pneumatic_since
     shortest, meet = SHORTEST * par.pneumatic_step, -s.u_r / max(s.v_p - s.v_b, BOUNCE)
     if s.closed == 1:
         return shortest
@@ -249,14 +284,12 @@ def lasts(par, s):
 @kernel
 def renew(par, s, h):
     """Foretell the gas where that is needed, for no less than a time."""
-    since, span = s.pneumatic_since, s.pneumatic_span
-    from_v, then_v = s.pneumatic_from_v, s.pneumatic_then_v
-    if not is_past(s, since, span, s.pneumatic_touched, from_v, then_v):
+    if not is_over(s):
         return
     if s.pneumatic_mass_u == 0.0:
         keep_gas(par, s, open_air(par, outside(par, s), -s.u_r))
         s.pneumatic_supply = set_pressure(par, s)
-    elif since > 0.0:
+    elif s.pneumatic_since > 0.0:
         settle(par, s)
     # what is asked for less is held on in steps, in which a bit that bounces may be anywhere
     is_whole = h >= 0.5 * SHORTEST * par.pneumatic_step
@@ -282,8 +315,8 @@ def pass_time(par, s, h):
     """Note what was given for h."""
     s.pneumatic_given += s.f_pneumatic_piston * h
     s.pneumatic_given_bit += s.f_pneumatic_bit * h
-    s.pneumatic_given_work += s.f_pneumatic_piston * (s.u_r - s.pneumatic_last_u)
-    s.pneumatic_last_u, s.pneumatic_last_v = s.u_r, s.v_p
+    s.pneumatic_given_work += s.f_pneumatic_piston * (s.path_p - s.pneumatic_last_path)
+    s.pneumatic_last_path, s.pneumatic_last_v = s.path_p, s.v_p
     s.pneumatic_since += h
     note_pressures(par, s, min(s.pneumatic_since / max(s.pneumatic_span, LEAST_DIVISOR), 1.0))
     if -s.u_r > par.pneumatic_upper_exhaust_edge:
@@ -366,7 +399,7 @@ COMPONENT = Component(
         "brought": ("J", "energy that came with air and through walls, less what left with air",
                     0.0),
         "expanded": ("J", "work of the chambers' pressures as they grow", 0.0),
-        "gas_work": ("J", "work of the gas on the piston, relative to the bit, by the gas", 0.0),
+        "gas_work": ("J", "work of the gas on the piston, by the gas", 0.0),
         "held_work": ("J", "the same by the forces that solvers took", 0.0),
     },
     hidden=(
@@ -375,8 +408,8 @@ COMPONENT = Component(
         "then_x", "then_v", "then_used", "then_vented", "then_brought", "then_expanded",
         "then_impulse", "then_on_bit", "then_work",
         "from_x", "from_v", "bit_velocity", "touched", "span", "since", "base", "slope",
-        "mean_on_bit", "given", "given_bit", "given_work", "owed", "owed_bit", "last_u", "last_v",
-        "consumed_before", "reach",
+        "mean_on_bit", "load_change", "from_u", "pull", "given", "given_bit", "given_work", "owed", "owed_bit", "from_path", "last_path", "last_v",
+        "consumed_before", "reach", "rest_used", "rest_vented", "rest_brought", "rest_expanded",
     ),
     pass_time=pass_time,
     inputs=("supply_pressure", "supply_flow", "back_pressure"),

@@ -14,6 +14,8 @@ from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
 STABLE = 2.0
+# Below this one a step is as good by two stages, at its start and in its middle.
+GENTLE = 0.06
 # Where the stages of a step are, and their shares of it.
 PARTS, SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 # A step ends where a port bends its flow, but for one shorter than this share of it.
@@ -24,7 +26,7 @@ MOST_STEPS = 20_000
 # A stop of some stiffness [N/m] leaves about this share of the upper chamber.
 LEAST_SHARE, STOP = 1e-2, 1e8
 # Steps are short by how fast a chamber shrinks, and by how fast a piston swings on its gas.
-SHRINKS, SWINGS = 2.0, 3.0
+SHRINKS, SWINGS = 4.0, 3.0
 # A piston that is faster or slower by this than was foretold has met something [m/s].
 JUMP = 1.0
 # Friction has its full value from some times this speed on [m/s].
@@ -102,10 +104,11 @@ def rates_of(par, air, around, y, bounds):
     """
     gas, x, v = y.gas, y.x, y.v
     size_u, size_l = size_of_upper(par, x), size_of_lower(par, x)
-    size_x = par.pneumatic_exhaust_volume
-    upper = volume_of(gas.mass_u, gas.energy_u, size_u)
-    lower = volume_of(gas.mass_l, gas.energy_l, size_l)
-    behind = volume_of(gas.mass_x, gas.energy_x, size_x)
+    size_x, per_both = par.pneumatic_exhaust_volume, 1.0 / (size_u * size_l)
+    per_u, per_l, per_x = size_l * per_both, size_u * per_both, 1.0 / size_x
+    upper = volume_of(gas.mass_u, gas.energy_u, size_u, per_u)
+    lower = volume_of(gas.mass_l, gas.energy_l, size_l, per_l)
+    behind = volume_of(gas.mass_x, gas.energy_x, size_x, per_x)
     share, each = par.pneumatic_discharge, 1.0 / par.pneumatic_ramp
     to_upper = flow(air, upper, opened(
         par, par.pneumatic_upper_intake, (x - par.pneumatic_upper_intake_edge) * each))  # fmt: skip
@@ -133,7 +136,7 @@ def rates_of(par, air, around, y, bounds):
     force += STOP * max(beyond, 0.0)
     rate = 0.0
     if bounds:
-        by_u, by_l = area_u / size_u, area_l / size_l
+        by_u, by_l = area_u * per_u, area_l * per_l
         spring = RATIO * max(upper.pressure * area_u * by_u, lower.pressure * area_l * by_l)
         spring = max(spring, STOP if beyond > 0.0 else 0.0)
         mixed = stiffness(across, upper, lower)
@@ -141,9 +144,9 @@ def rates_of(par, air, around, y, bounds):
         by_lower = stiffness(from_lower, lower, behind)
         vented = stiffness(out, behind, around) + stiffness(past, air, behind)
         rate = max(
-            (stiffness(to_upper, air, upper) + by_upper + mixed) / size_u,
-            (stiffness(to_lower, air, lower) + by_lower + mixed) / size_l,
-            (by_upper + by_lower + vented) / size_x,
+            (stiffness(to_upper, air, upper) + by_upper + mixed) * per_u,
+            (stiffness(to_lower, air, lower) + by_lower + mixed) * per_l,
+            (by_upper + by_lower + vented) * per_x,
             SWINGS * math.sqrt(max(spring, 0.0) / par.mass_p),
             SHRINKS * abs(v) * max(by_u, by_l),
         )
@@ -267,6 +270,16 @@ def on_way(way, y, t):
 
 
 @inlined
+def middle(way, y, t, h):
+    """The same gas in the middle of a step, with the step's mean velocity."""
+    y = on_way(way, y, t + 0.5 * h)
+    if not way.known:
+        return y
+    x = on_way(way, y, t + h).x - on_way(way, y, t).x
+    return Ahead(y.gas, y.x, x / h, y.done, y.rate)
+
+
+@inlined
 def next_bend(par, x, v):
     """Time in which the piston comes to where a port begins to open, or is open [s]."""
     ramp, way = par.pneumatic_ramp, NO_WAY
@@ -296,17 +309,22 @@ def go(par, supply, hole, y, way):
     around = reservoir(hole, par.pneumatic_ambient_temperature)
     t, left = 0.0, way.span
     for _ in range(MOST_STEPS):
-        here, end, h = y, y, 0.0
-        for stage in range(4):
-            rate = rates_of(par, air, around, on_way(way, here, t + PARTS[stage] * h), stage == 0)
-            if stage == 0:
-                steps = left * max(1.0 / par.pneumatic_step, rate.rate / STABLE)
-                h = left / max(math.ceil(steps - 1e-9), 1)
-                bend = next_bend(par, y.x, y.v)
-                if LEAST_PART * h < bend < h:
-                    h = bend
-            end = plus(end, rate, SHARES[stage] * h)
-            here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
+        rate = rates_of(par, air, around, on_way(way, y, t), True)
+        steps = left * max(1.0 / par.pneumatic_step, rate.rate / STABLE)
+        h = left / max(math.ceil(steps - 1e-9), 1)
+        bend = next_bend(par, y.x, y.v)
+        if LEAST_PART * h < bend < h:
+            h = bend
+        here = plus(y, rate, 0.5 * h)
+        if h * rate.rate < GENTLE:
+            rate = rates_of(par, air, around, middle(way, here, t, h), False)
+            end = plus(y, rate, h)
+        else:
+            end = plus(y, rate, SHARES[0] * h)
+            for stage in range(1, 4):
+                rate = rates_of(par, air, around, on_way(way, here, t + PARTS[stage] * h), False)
+                end = plus(end, rate, SHARES[stage] * h)
+                here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
         t += h
         y = on_way(way, end, t)
         left -= h

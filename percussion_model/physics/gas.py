@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from percussion_model.physics.kernel import inlined
+from percussion_model.physics.kernel import LEAST_DIVISOR, inlined
 
 # Gas constant of air [J/(kg K)], and the ratio of its specific heats.
 AIR, RATIO = 287.05, 1.4
@@ -76,23 +76,34 @@ class Volume(NamedTuple):
     """What orifices see of a volume of gas."""
 
     pressure: float  # [Pa]
+    per_pressure: float  # 1/pressure [1/Pa]
     slow: float  # 1/sqrt(R T) [s/m]
     enthalpy: float  # c_p T [J/kg]
 
 
 @inlined
-def volume_of(mass, energy, size):
-    """Look at a mass [kg] with an internal energy [J] in a volume [m^3]."""
-    each = energy / mass
+def volume_of(mass, energy, size, per_size):
+    """Look at a mass [kg] with an internal energy [J] in a volume [m^3], and 1/volume."""
+    each = RATIO - 1.0
+    per_both = 1.0 / (mass * energy)  # the only division
+    specific, light = energy * energy * per_both, mass * mass * per_both
     return Volume(
-        (RATIO - 1.0) * energy / size, 1.0 / math.sqrt((RATIO - 1.0) * each), RATIO * each
+        each * energy * per_size,
+        mass * per_both * size / each,
+        math.sqrt(each * specific) * light / each,
+        RATIO * specific,
     )
 
 
 @inlined
 def reservoir(pressure, temperature):
     """A volume so large that it stays as it is."""
-    return Volume(pressure, 1.0 / math.sqrt(AIR * temperature), HEAT * temperature)
+    return Volume(
+        pressure,
+        1.0 / max(pressure, LEAST_DIVISOR),
+        1.0 / math.sqrt(AIR * temperature),
+        HEAT * temperature,
+    )
 
 
 class Flow(NamedTuple):
@@ -108,7 +119,7 @@ def flow(one, other, area):
     high, low, sign = one, other, 1.0
     if one.pressure < other.pressure:
         high, low, sign = other, one, -1.0
-    through = flow_function(low.pressure / high.pressure) * area * high.slow
+    through = flow_function(low.pressure * high.per_pressure) * area * high.slow
     mass = sign * through * high.pressure
     return Flow(mass, mass * high.enthalpy)
 

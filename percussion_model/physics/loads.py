@@ -167,15 +167,11 @@ def pass_time(par, s, h):
 
 
 @inlined
-def bend_of(par, s, h, whole):
-    """Way that a piston is late or early by where a mean force is held for a changing one [m].
-
-    Parameters
-    ----------
-    h, whole : float
-        Time for which it was held, and that of which it is the mean [s].
-    """
-    return slope_on_piston(par, s) * h * h * (h / 6.0 - 0.25 * whole) / par.mass_p
+def bend_of(par, s, h):
+    """Way that a piston is late or early by where a mean force was held for a changing one [m]."""
+    way = -slope_on_piston(par, s) * h * h * h / (12.0 * par.mass_p)
+    s.path_p += way
+    return way
 
 
 @inlined
@@ -225,6 +221,7 @@ def move_to_components(par, s, path):
     """Enter what components do over a path of the piston [m] as theirs, not as the drive's."""
     if par.effects == 1:
         s.e_drive -= s.f_on_piston * path
+        s.path_p += path
         book_on_piston(par, s, path)
 
 

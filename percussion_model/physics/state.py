@@ -109,6 +109,7 @@ _MOTION = [
     ("v_p", "f8"),  # mean velocities [m/s]
     ("v_b", "f8"),
     ("u_r", "f8"),  # relative mean displacement of the pressure law [m]
+    ("path_p", "f8"),  # of the piston's mean, where components act [m]
     ("t_open", "f8"),  # when the gap opened last [s]
     ("t_standstill", "f8"),  # when standstill began [s]
     ("watched_energy", "f8"),  # of the bit's motion, when that was last compared with W_R [J]

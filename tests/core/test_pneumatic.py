@@ -44,7 +44,7 @@ def passed(high, low, temperature, pressure, fills, time, steps):
     for _ in range(steps):
         m, u, sum_m, sum_u = mass, energy, 0.0, 0.0
         for stage in range(4):
-            here = volume_of(m, u, SIZE)
+            here = volume_of(m, u, SIZE, 1.0 / SIZE)
             if fills:
                 found = flow(reservoir(high, WARM), here, AREA)
                 dm, du = found.mass, found.energy

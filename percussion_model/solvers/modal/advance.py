@@ -129,7 +129,7 @@ def hold_on(par, s):
     if s.time >= s.held_until:
         if s.held_until > s.held_from and s.closed == 0:
             whole = par.tick * (s.held_until - s.held_from)
-            way = bend_of(par, s, whole, whole)
+            way = bend_of(par, s, whole)
             s.u_p += way
             s.u_r += way
             s.gap -= way

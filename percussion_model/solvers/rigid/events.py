@@ -177,7 +177,7 @@ def process_event(par, s, blows, events):
         take_line(par, s)
     elif kind == Next.HOLD:
         if s.held == 0:
-            s.gap -= bend_of(par, s, s.next_tau, s.next_tau)
+            s.gap -= bend_of(par, s, s.next_tau)
             s.u_r = -s.gap
         note_standstill_force(par, s)
         mark_standstill(s)
