@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.interface.progress import progress
+from percussion_model.scene.hammers import atmosphere
 
 from .compressor_too_small import AMPLE, ARCHIVES, couple, numbers, whole_blows
 from .coupled import Quantity, print_columns, save_table
@@ -26,23 +27,18 @@ TOLD = (0, 2000, 4000)  # heights whose numbers are printed [m]
 # Label with unit, factor and column of each panel.
 PANELS: tuple[Quantity, ...] = (
     ("air that the hammer takes, by mass [kg/s]", 1.0, "air"),
-    ("free air that the compressor takes in [m³/min]", 60.0, "free_air"),
+    ("air that the compressor takes in [m³/min]", 60.0, "free_air"),
     ("power of the blows [kW]", 1e-3, "power"),
     ("power that the compressor takes, 60 % efficient [kW]", 1e-3, "compressor"),
 )
 SHOWN: dict[str, Quantity] = {
     "pressure": ("pressure at the hammer", 1e-5, "bar"),
     "air": ("air that the hammer takes", 1.0, "kg/s"),
-    "free_air": ("free air that the compressor takes in", 60.0, "m³/min"),
+    "free_air": ("air that the compressor takes in", 60.0, "m³/min"),
     "frequency": ("blows", 1.0, "1/s"),
     "power": ("power of the blows", 1e-3, "kW"),
     "compressor": ("power that the compressor takes, 60 % efficient", 1e-3, "kW"),
 }
-
-
-def ambient(height: float) -> float:
-    """Pressure of the standard atmosphere, ISO 2533 [Pa]."""
-    return float(101_325.0 * (1.0 - 2.25577e-5 * height) ** 5.25588)
 
 
 def simulate(
@@ -54,7 +50,7 @@ def simulate(
     """
     rows = []
     for height in heights:
-        around = ambient(height)
+        around = atmosphere(height)[0]
         found = couple(
             hammer, supply, DURATION, {"pneumatic.ambient_pressure": around},
             {"ambient.pressure": around, "compressor.flow_limit": AMPLE},

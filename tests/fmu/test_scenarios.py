@@ -171,7 +171,7 @@ def test_hammer_at_altitude(air_hammer, fmus, tmp_path):
     """Gauge pressure decides; free air goes with the pressure of the place, as work by its log."""
     found = hammer_at_altitude.simulate(air_hammer, fmus / "Supply.fmu", (0.0, 3000.0))
     assert hammer_at_altitude.draw(found, tmp_path / "high.png").stat().st_size > 20_000
-    thin = hammer_at_altitude.ambient(3000.0)
+    thin = hammer_at_altitude.atmosphere(3000.0)[0]
     assert thin == pytest.approx(70_108.0, rel=1e-4)  # ISO 2533
     ratio = {name: column[1] / column[0] for name, column in found.items() if name != "height"}
     # an independent model of this hammer: 0.6 % less air, equal power
