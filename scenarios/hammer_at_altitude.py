@@ -27,14 +27,14 @@ TOLD = (0, 2000, 4000)  # heights whose numbers are printed [m]
 # Label with unit, factor and column of each panel.
 PANELS: tuple[Quantity, ...] = (
     ("air that the hammer takes, by mass [kg/s]", 1.0, "air"),
-    ("air that the compressor takes in [m³/min]", 60.0, "free_air"),
+    ("air that the compressor takes in [m³/min]", 60.0, "intake"),
     ("power of the blows [kW]", 1e-3, "power"),
     ("power that the compressor takes, 60 % efficient [kW]", 1e-3, "compressor"),
 )
 SHOWN: dict[str, Quantity] = {
     "pressure": ("pressure at the hammer", 1e-5, "bar"),
     "air": ("air that the hammer takes", 1.0, "kg/s"),
-    "free_air": ("air that the compressor takes in", 60.0, "m³/min"),
+    "intake": ("air that the compressor takes in", 60.0, "m³/min"),
     "frequency": ("blows", 1.0, "1/s"),
     "power": ("power of the blows", 1e-3, "kW"),
     "compressor": ("power that the compressor takes, 60 % efficient", 1e-3, "kW"),
@@ -46,7 +46,7 @@ def simulate(
 ) -> dict[str, np.ndarray]:
     """Means of a run at each height, by name, with "height" [m]; else as `numbers`.
 
-    And free_air, at the pressure of the place [m^3/s], and compressor, its power [W].
+    And intake, the air taken in at the place's pressure [m^3/s], and compressor, its power [W].
     """
     rows = []
     for height in heights:
@@ -57,7 +57,7 @@ def simulate(
         )  # fmt: skip
         late = whole_blows(found, LATE)
         power = np.ptp(found["energy"][late]) / np.ptp(found["time"][late])
-        means = {"free_air": found["flow"][late].mean(), "compressor": power}
+        means = {"intake": found["flow"][late].mean(), "compressor": power}
         rows.append({"height": height, **numbers(found, LATE), **means})
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
