@@ -39,6 +39,8 @@ STANDING = 1e-2
 # A supply below this share of what it is set to is starved, and one that gives more than it gets,
 # but for what a few blows differ by.
 STARVED, EVEN = 0.95, 1.02
+# Ports of chambers of air, by their edges from the bit up (Bo et al. 2021, table 1).
+PORTS = ("upper_exhaust", "lower_intake", "upper_intake", "lower_exhaust")
 # A rear chamber of oil is below the pressure around it for about 3 % of the time, as measured; an
 # accumulator is never empty.
 MOST_VOID, MOST_EMPTY = 0.1, 0.01
@@ -178,12 +180,18 @@ def _about_blows(result: Result) -> Iterator[str]:
 
 
 def _about_supply(result: Result) -> Iterator[str]:
-    """Say that a hammer is starved of air."""
+    """Say that a hammer is starved of air, and what is odd about its ports."""
     if result.scene.effects.drive != "pneumatic":
         return
     scene, blows = result.scene, result.counted
     set_to, found = scene["pneumatic.supply_pressure"], result.hammer_pressure
     most, volume = scene["pneumatic.supply_flow"], scene["pneumatic.supply_volume"]
+    ordered = [scene[f"pneumatic.{port}_edge"] for port in PORTS]
+    if ordered != sorted(ordered):
+        edges = ", ".join(f"pneumatic.{port}_edge" for port in PORTS)
+        yield f"edges of ports are out of order, which is from the bit up {edges}: air is wasted"
+    if missing := [f"pneumatic.{port}" for port in PORTS if scene[f"pneumatic.{port}"] == 0.0]:
+        yield f"ports are missing ({', '.join(missing)} = 0 m^2): chambers live on leaks"
     falls = len(blows) > 0 and 0.0 < EVEN * most < float(blows["pneumatic_air"].mean())
     if most > 0.0 == volume:
         yield (
