@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from percussion_model.interface.progress import progress
+from percussion_model.scene.hammers import atmosphere
 
 from .compressor_too_small import AMPLE, ARCHIVES, couple, numbers, whole_blows
 from .coupled import Quantity, print_columns, save_table
@@ -26,23 +27,18 @@ TOLD = (0, 2000, 4000)  # heights whose numbers are printed [m]
 # Label with unit, factor and column of each panel.
 PANELS: tuple[Quantity, ...] = (
     ("air that the hammer takes, by mass [kg/s]", 1.0, "air"),
-    ("free air that the compressor takes in [m³/min]", 60.0, "free_air"),
+    ("air that the compressor takes in [m³/min]", 60.0, "intake"),
     ("power of the blows [kW]", 1e-3, "power"),
     ("power that the compressor takes, 60 % efficient [kW]", 1e-3, "compressor"),
 )
 SHOWN: dict[str, Quantity] = {
     "pressure": ("pressure at the hammer", 1e-5, "bar"),
     "air": ("air that the hammer takes", 1.0, "kg/s"),
-    "free_air": ("free air that the compressor takes in", 60.0, "m³/min"),
+    "intake": ("air that the compressor takes in", 60.0, "m³/min"),
     "frequency": ("blows", 1.0, "1/s"),
     "power": ("power of the blows", 1e-3, "kW"),
     "compressor": ("power that the compressor takes, 60 % efficient", 1e-3, "kW"),
 }
-
-
-def ambient(height: float) -> float:
-    """Pressure of the standard atmosphere, ISO 2533 [Pa]."""
-    return float(101_325.0 * (1.0 - 2.25577e-5 * height) ** 5.25588)
 
 
 def simulate(
@@ -50,18 +46,18 @@ def simulate(
 ) -> dict[str, np.ndarray]:
     """Means of a run at each height, by name, with "height" [m]; else as `numbers`.
 
-    And free_air, at the pressure of the place [m^3/s], and compressor, its power [W].
+    And intake, the air taken in at the place's pressure [m^3/s], and compressor, its power [W].
     """
     rows = []
     for height in heights:
-        around = ambient(height)
+        around = atmosphere(height)[0]
         found = couple(
             hammer, supply, DURATION, {"pneumatic.ambient_pressure": around},
             {"ambient.pressure": around, "compressor.flow_limit": AMPLE},
         )  # fmt: skip
         late = whole_blows(found, LATE)
         power = np.ptp(found["energy"][late]) / np.ptp(found["time"][late])
-        means = {"free_air": found["flow"][late].mean(), "compressor": power}
+        means = {"intake": found["flow"][late].mean(), "compressor": power}
         rows.append({"height": height, **numbers(found, LATE), **means})
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 

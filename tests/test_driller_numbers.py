@@ -10,15 +10,17 @@ import re
 import numpy as np
 import pytest
 
-from percussion_model import Result, Scene, settled, simulate
+from percussion_model import Result, Scene, SceneError, settled, simulate
 from percussion_model.analysis.drill_string import bar_stress
 from percussion_model.interface.plotting.window import StressField, peak_stresses
 from percussion_model.interface.report import headline_rows, mean_cards
 from percussion_model.interface.terminal import show_settled, show_summary
 from percussion_model.physics.records import BLOW
-from percussion_model.scene.hammers import hammer, hammers, with_chambers
+from percussion_model.scene.hammers import at_altitude, hammer, hammers, with_chambers
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS, driller_numbers
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
+from percussion_model.simulation.rate import rate_of_blows
+from percussion_model.simulation.warnings import unused_note
 
 RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 HOLE = 0.1
@@ -245,7 +247,36 @@ def test_hammers_on_air_are_told_to_be_starved_or_to_have_stalled():
     starved = simulate(scene.replace(**small), 2.0)
     assert [text for text in starved.warnings if text.startswith("the hammer is starved")]
     assert starved.hammer_pressure < 20e5
+    # a large supply falls for hours, and no two blows are alike
+    falling = scene.replace(**small | {"pneumatic.supply_volume": 5.0})
+    told = settled(falling, most_blows=40, error_estimate=True).warnings
+    assert any("while it falls no two blows are alike" in text for text in told)
+    held = simulate(scene.replace(**small | {"pneumatic.supply_volume": 0.0}), 0.5).warnings
+    assert any(text.startswith("pneumatic.supply_flow has no effect") for text in held)
+    by_law = with_chambers("dth5", 24e5).replace(**{"effects.drive": "pressure"})
+    assert unused_note(by_law.given_in_vain).endswith("in this scene: pneumatic (18 keys)")
     # between the edges of both intakes, with no way out of it
     rest = {"start.gap": 0.047, "start.piston_velocity": 0.0, "effects.gravity": False}
     stalled = simulate(scene.replace(**rest, **{"pneumatic.leak": 0.0}), 0.5)
     assert any(text.startswith("the hammer has stalled: no whole") for text in stalled.warnings)
+
+
+def test_a_hammer_goes_up_a_mountain():
+    """ISO 2533: 70,109 Pa and 268.65 K at 3,000 m; air by mass hardly changes at equal gauge."""
+    scene = with_chambers("dth5", 24e5).computed_by("rigid", **{"run.error_estimate": False})
+    high = at_altitude(scene, 3000.0)
+    around = [high[f"pneumatic.ambient_{name}"] for name in ("pressure", "temperature")]
+    assert around == pytest.approx([70_109.0, 268.65], rel=1e-5)
+    air = [simulate(one, 1.0).summary()["pneumatic_air"] for one in (high, scene)]
+    assert air[0] == pytest.approx(air[1], rel=0.01)
+    with pytest.raises(SceneError, match="needs air in chambers"):
+        at_altitude(Scene(), 3000.0)
+
+
+def test_rounding_of_a_depth_is_no_advance():
+    blows = np.zeros(5, BLOW)
+    blows["hole_advance"], blows["period"], blows["blow_energy"] = 3e-19, 0.1, 10.0
+    found = numbers_over(blows)
+    assert found["penetration_per_blow"] == 0.0
+    assert math.isnan(found["energy_per_advance"])
+    assert rate_of_blows(blows) == (0.0, 0.0)

@@ -49,9 +49,12 @@ def test_a_law_gives_the_cycle_that_it_was_made_of(weight):
     assert np.isnan(law_of(15.3, 1e6, 8.0, 0.4, 0.05)).all()
 
 
-@pytest.mark.parametrize(("bar", "rebound"), [(6, 0.1), (24, 0.3), (24, 0.5)])
-def test_a_run_by_the_law_has_velocity_and_period_of_the_chambers(bar, rebound):
-    scene = with_chambers("dth5", bar * BAR)
+@pytest.mark.parametrize(
+    ("name", "bar", "rebound"),
+    [("dth5", 6, 0.1), ("dth5", 24, 0.3), ("dth5", 24, 0.5), ("hc25", 120, 0.25)],
+)
+def test_a_run_by_the_law_has_velocity_and_period_of_the_chambers(name, bar, rebound):
+    scene = with_chambers(name, bar * BAR)
     row = blow_row(scene, rebound)
     law = {f"drive.{name}": float(row[name]) for name in ("force", "reversal_distance")}
     by_law = on_a_wall(scene.replace(**{"effects.drive": "pressure", **law}), rebound)

@@ -56,6 +56,8 @@ FACTORS = {
     ("m min^-1", "m/s"): Fraction(1, 60),
     ("km/h", "m/s"): Fraction(5, 18),
     ("%", "-"): Fraction(1, 100),
+    # free air of DIN 1343: 1.2923 kg in each m^3
+    ("m^3/min", "kg/s"): Fraction(12923, 600_000),
 }
 
 

@@ -13,6 +13,8 @@ NAMES_OUTSIDE = {name: one.key for name, one in INPUTS.items()} | {
 }
 # Inputs from which forces of the drive, or the pressure at it, follow.
 DRIVE_INPUTS = ("percussion_on", "supply_pressure", "drive.effective_area", "piston_force")
+# Hosts go between two equal values of an input, to within so much of it.
+SAME = 1e-14
 # The drive force's name in a message.
 PRODUCT = "supply_pressure * drive.effective_area"
 # Inputs that are inputs of the solver as they are.

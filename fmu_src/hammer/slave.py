@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS, PRODUCT
+from fmu_src.hammer.inputs import DRIVE_INPUTS, NAMES_OUTSIDE, PLAIN_INPUTS, PRODUCT, SAME
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.warnings import Warnings
@@ -175,16 +175,19 @@ class PercussiveHammer(Slave):
             wanted |= drive
         new.clear()
         changed = {name: value for name, value in wanted.items() if value != acting[name]}
+        vain = [name for name in changed if not self.acts(motion.scene, name)]
+        for name in vain:
+            if not math.isclose(changed.pop(name), acting[name], rel_tol=SAME):
+                self.warn(f"a new {NAMES_OUTSIDE[name]} has no effect in this scene")
+            acting[name] = wanted[name]
         acting |= changed
-        return {name: value for name, value in changed.items() if self.acts(motion.scene, name)}
+        return changed
 
     def acts(self, scene: Scene, name: str) -> bool:
-        """Whether an input has an effect in the scene; says so in the log where not."""
+        """Whether an input has an effect in the scene."""
         acts = self._acts.get(name)
         if acts is None:
             acts = self._acts[name] = not no_effect_reason(scene, name)
-        if not acts:
-            self.warn(f"a new {NAMES_OUTSIDE[name]} has no effect in this scene")
         return acts
 
     # outputs

@@ -145,7 +145,8 @@ def _inputs(scene: Scene) -> Iterator[Variable]:
                 reference=reference(name, "input"),
                 type="Boolean",
                 causality="input",
-                description="whether the drive gets pressure, or passes piston_force on",
+                description="whether the drive gets pressure, or passes piston_force on; off, air "
+                "of chambers flows back, and pneumatic.air is below 0",
                 variability="discrete",
                 start=True,
             )

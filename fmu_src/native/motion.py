@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from fmu_src.hammer.inputs import SAME
 from fmu_src.native import kinds
 from percussion_model.engine.layout import (
     blow_records,
@@ -180,7 +181,8 @@ def set_inputs(base, wanted):
             if head.acts[k] == 1:
                 acts = True
             else:
-                in_vain |= 1 << k
+                if abs(wanted[k] - motion.acting[k]) > SAME * abs(wanted[k]):
+                    in_vain |= 1 << k
                 motion.acting[k] = wanted[k]
     if not acts:
         return Status.DONE.value, in_vain

@@ -111,13 +111,13 @@ class AirLine:
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
         pressure = self.receiver / self.in_receiver - self.ambient
-        free = self.heat / self.ambient  # volume of free air by mass
+        taken_in = self.heat / self.ambient  # volume by mass, in the surroundings
         return {
             **self.signals(),
             "hose_pressure": pressure,
-            "flow": self.flow * free,
+            "flow": self.flow * taken_in,
             "energy": self.energy,
-            "relief_volume": self.relieved * free,
+            "relief_volume": self.relieved * taken_in,
             "relief_open": pressure >= self.parameters["relief_pressure"] * (1.0 - 1e-12),
             "air_given": self.given,
             "air_lost": self.lost,

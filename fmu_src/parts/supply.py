@@ -134,9 +134,9 @@ TABLE = PartTable(
     outputs={
         "supply_pressure": ("Pa", "gauge pressure at the hammer"),
         "hose_pressure": ("Pa", "gauge pressure at the source"),
-        "flow": ("m3/s", "flow of the source; of a compressor, of free air that it takes in"),
+        "flow": ("m3/s", "flow of the source; of a compressor, of air as it takes it in"),
         "energy": ("J", "energy given by the source"),
-        "relief_volume": ("m3", "volume through the relief valve; of free air"),
+        "relief_volume": ("m3", "volume through the relief valve; of air as it was taken in"),
         "relief_open": (False, "whether the relief valve is open"),
         "back_pressure": ("Pa", "gauge pressure of the water at the hammer"),
         "air_given": ("kg", "air from the compressor"),

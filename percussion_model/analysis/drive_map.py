@@ -1,4 +1,4 @@
-"""Map of the drive: the pressure law that stands for chambers of air, by pressure and rebound.
+"""Map of the drive: the pressure law that stands for chambers, by pressure and rebound.
 
 Chambers run with a rigid piston over a bit at rest. The law that has their impact velocity and
 period at a rebound is the cheap drive (`effects.drive = "pressure"`). What it is off by between
@@ -21,7 +21,8 @@ __all__ = ["DriveMap", "drive_map"]
 
 # Rebounds, and pressures by that of the scene, where no others are asked for.
 REBOUNDS, PRESSURES = (0.1, 0.3, 0.5, 0.7), (0.25, 0.5, 0.75, 1.0, 1.25)
-SUPPLY = "pneumatic.supply_pressure"
+# What chambers take, by the choice of `effects.drive`: air [kg/s] or oil [m^3/s].
+TAKEN = {"pneumatic": "pneumatic_air", "hydraulic": "hydraulic_oil"}
 # A bit so large that no blow moves it [m, m^2].
 AT_REST = [{"length": 10.0, "area": 10.0}]
 # Each correction for weight leaves some per cent of the one before: so many leave rounding.
@@ -31,7 +32,7 @@ HELD = 1.5
 # Means over blows that do not repeat are known so well, or are those of 400 blows.
 SCATTER = 1e-3
 # What is told of chambers, of their law, and the relative errors of that.
-BLOWS = ("frequency", "impact_velocity", "blow_energy", "stroke", "air", "rate")
+BLOWS = ("frequency", "impact_velocity", "blow_energy", "stroke", "flow", "rate")
 LAW = ("force", "reversal_distance")
 LEFT_OUT = ("left_out_frequency", "left_out_blow_energy")
 IN_ROCK = {"rock_frequency": "frequency", "rock_blow_energy": "blow_energy", "rock_rate": "rate"}
@@ -82,7 +83,7 @@ def drive_map(
     Parameters
     ----------
     scene : Scene
-        With `effects.drive = "pneumatic"`.
+        With chambers of air or oil (`effects.drive`).
     pressures : sequence of float, optional
         Of the supply, above that of the surroundings [Pa]; a quarter to five quarters of the
         scene's own if left out.
@@ -91,18 +92,21 @@ def drive_map(
     progress : callable, optional
         Called with the laws tried and their count.
     """
-    if scene.effects.drive != "pneumatic":
-        raise SceneError(f'effects.drive = "{scene.effects.drive}": must be "pneumatic" for a map')
-    own_pressure = scene[SUPPLY]
+    if scene.effects.drive not in TAKEN:
+        raise SceneError(
+            f'effects.drive = "{scene.effects.drive}": must be "pneumatic" or "hydraulic" for a map'
+        )
+    supply = f"{scene.effects.drive}.supply_pressure"
+    own_pressure = scene[supply]
     columns = sorted(set(pressures or [share * own_pressure for share in PRESSURES]))
     across = sorted(set(rebounds))
     if not across or not 0.0 <= across[0] <= across[-1] < 1.0:
         raise SceneError(f"rebounds {across}: must be numbers from 0 on and below 1")
     rows = np.array([
-        [blow_row(scene.replace(**{SUPPLY: pressure}), rebound) for rebound in across]
+        [blow_row(scene.replace(**{supply: pressure}), rebound) for rebound in across]
         for pressure in columns
     ])  # fmt: skip
-    own = np.array([settled_row(scene.replace(**{SUPPLY: pressure})) for pressure in columns])
+    own = np.array([settled_row(scene.replace(**{supply: pressure})) for pressure in columns])
     for k, row in enumerate(own):
         row["force"], row["reversal_distance"] = _between(rows, row["pressure"], row["rebound"])
         for n, one in enumerate((*rows[k], row)):
@@ -115,8 +119,10 @@ def drive_map(
 
 def on_a_wall(scene: Scene, rebound: float) -> Scene:
     """Return the scene with a rigid piston over a bit at rest, which gives back a rebound."""
-    off = [f"effects.{n}" for n in ("feed", "barrier", "cuttings", "breaking", "rotation")]
+    names = ("feed", "barrier", "cuttings", "breaking", "rotation", "string")
+    off = [f"effects.{name}" for name in names]
     changes = {"effects.rock": "wall", "bit.sections": AT_REST, "contact.restitution": rebound}
+    changes["string.rods"] = None
     return scene.computed_by("rigid", **dict.fromkeys(off, False), **changes)
 
 
@@ -169,12 +175,16 @@ def _body(scene: Scene) -> tuple[float, float]:
 def settled_row(scene: Scene) -> np.ndarray:
     """What the settled motion of a scene tells of a ROW; all else, and of none, is NaN."""
     row, found = np.full((), math.nan, ROW), settled(scene, scatter=SCATTER)
-    row["pressure"] = scene[SUPPLY]
+    drive = scene.effects.drive
+    if drive in TAKEN:
+        row["pressure"] = scene[f"{drive}.supply_pressure"]
     if found.kind != "stalled":
         blows = found.counted
         for name in ("impact_velocity", "blow_energy", "stroke"):
             row[name] = np.mean(blows[name])
-        row["frequency"], row["air"] = 1.0 / found.blow_period, np.mean(blows["pneumatic_air"])
+        row["frequency"] = 1.0 / found.blow_period
+        if drive in TAKEN:
+            row["flow"] = np.mean(blows[TAKEN[drive]])
         row["rebound"] = -np.mean(blows["rebound_velocity"]) / row["impact_velocity"]
         row["rate"] = found.rate_of_penetration
     return row

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -119,8 +120,7 @@ def show_summary(result: Result) -> None:
         table.add_row("Whole blows", f"{len(result.blows)}", after)
     table.add_row("Solver", result.solver, "")
     if result.cells:
-        counts = " + ".join(map(str, result.cells.values()))
-        table.add_row(counted(result.solver).capitalize(), counts, ", ".join(result.cells))
+        table.add_row(counted(result.solver).capitalize(), *_cells_of_bars(result.cells))
     table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
     whose = "" if result.scene.solver.accuracy is None else ", all runs"
     table.add_row("Computed in", in_digits(result.wall_time, TIMED), f"s{whose}")
@@ -130,6 +130,17 @@ def show_summary(result: Result) -> None:
         note = f" {ABOUT_NUMBER}." if unknown else ""
         print_notes([about_errors(summary) + note])
     show_warnings(result.warnings)
+
+
+def _cells_of_bars(cells: Mapping[str, int]) -> tuple[str, str]:
+    """Cells of each bar and the names of the bars, of those of a drill string in short."""
+    runs = [(count, len(list(same))) for count, same in groupby(cells.values())]
+    counts = " + ".join(f"{many} × {count}" if many > 2 else " + ".join([str(count)] * many)
+                        for count, many in runs)  # fmt: skip
+    names = list(cells)
+    if len(names) > 3:
+        names[1:-1] = [f"{len(names) - 2} rods"]
+    return counts, ", ".join(names)
 
 
 def _add_driller_row(table: Table, summary: Mapping[str, Any], key: str) -> None:

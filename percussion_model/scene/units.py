@@ -13,6 +13,7 @@ import re
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from percussion_model.physics.gas import FREE_AIR
 from percussion_model.scene.rows import (
     REFUSED,
     ParameterRow,
@@ -86,7 +87,11 @@ QUANTITIES = {
     "m^3/s": Quantity("a flow", ("0.001", "60 l/min"), ("l/min", "m^3/min", "cm^3/s")),
     "m^3/s/Pa": Quantity("a leakage", ("1.5e-12", "1.5 cm^3/s/MPa"), ("cm^3/s/MPa", "l/min/bar")),
     "J/m^3": Quantity("an energy by volume", ("5.5e7", "55 MJ/m^3"), ("MJ/m^3", "J/cm^3")),
-    "kg/s": Quantity("a mass flow", ("0.45", "27 kg/min"), ("kg/min", "g/s", "lb/min")),
+    "kg/s": Quantity(
+        "a mass flow, or one of free air",
+        ("0.45", "27 kg/min", "20.89 m^3/min"),
+        ("kg/min", "m^3/min", "g/s", "lb/min"),
+    ),
     "K": Quantity("a temperature", ("300", "300000 mK"), ("mK",)),
     "W/K": Quantity("a conductance of heat", ("50", "0.05 kW/K"), ("kW/K",)),
     "-": Quantity("a pure number", ("0.01", "1 %"), ("%",)),
@@ -183,7 +188,7 @@ def with_point(text: str) -> str:
 
 @lru_cache(maxsize=256)
 def factor(unit: str, si: str) -> Fraction:
-    """Exact factor from a unit to an SI unit of the same dimension.
+    """Exact factor from a unit to an SI unit of the same dimension, or of free air to its mass.
 
     Raises
     ------
@@ -206,6 +211,8 @@ def factor(unit: str, si: str) -> Fraction:
         if str(error):
             raise
         own = None
+    if own != kind and si == "kg/s":  # a flow of free air
+        return factor(unit, "m^3/s") * Fraction(str(FREE_AIR))
     if own != kind:
         meant = _meant(unit, si)
         raise UnitError(f"{unit} is another quantity{meant}" if meant else "")

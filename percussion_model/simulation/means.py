@@ -9,7 +9,7 @@ import numpy as np
 
 from percussion_model.physics.gas import AIR
 from percussion_model.physics.records import BLOW_COLUMNS
-from percussion_model.simulation.rate import LEAST_BLOWS, ratios_of_sums
+from percussion_model.simulation.rate import LEAST_BLOWS, advances, ratios_of_sums
 
 # Means over blows, and the columns of the blow table behind them.
 _MEANS = {
@@ -58,6 +58,8 @@ def _column(blows: np.ndarray, name: str) -> np.ndarray:
         return np.where(blows["pneumatic_air"] > 0.0, blows["period"], 0.0)
     if name == "air_used":
         return np.asarray(blows["pneumatic_air"] * blows["period"])
+    if name == "hole_advance":
+        return advances(blows)
     return np.asarray(blows[name])
 
 
@@ -75,7 +77,7 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     """
     found = dict.fromkeys(_MEANS, math.nan)
     if len(blows):
-        means = np.mean([blows[column] for column in _MEANS.values()], axis=1).tolist()
+        means = np.mean([_column(blows, one) for one in _MEANS.values()], axis=1).tolist()
         found = dict(zip(_MEANS, means, strict=True))
     for name, column in _MEANS.items():
         if math.isnan(found[name]):
@@ -156,7 +158,7 @@ def scatter_over(blows: np.ndarray) -> dict[str, float]:
         for name, column in _MEANS.items()
         if name not in _OF_COMPONENTS or blows[column].any()
     }
-    pairs = {name: (blows[column], ones) for name, column in means.items()}
+    pairs = {name: (_column(blows, column), ones) for name, column in means.items()}
     for name, (column, by) in _RATIOS.items():
         if float(np.sum(_column(blows, by))) > 0.0:
             pairs[name] = _column(blows, column), _column(blows, by)

@@ -19,6 +19,8 @@ FEWEST_DEPENDENT = 20
 # Stretches that tell how scatter grows have this share of all blows. Longer ones are too few,
 # shorter ones do not show what blows take back from each other.
 STRETCH = 0.25
+# A hole that advances less in a blow does not: that is rounding of its depth [m].
+LEAST_ADVANCE = 1e-13
 # A hammer has stalled that begins no blow for so many periods of its longest.
 STALLED_PERIODS = 4.0
 
@@ -38,7 +40,13 @@ def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
     """
     if len(blows) < LEAST_BLOWS:
         return math.nan, math.nan
-    return ratio_of_sums(blows["hole_advance"], blows["period"])
+    return ratio_of_sums(advances(blows), blows["period"])
+
+
+def advances(blows: np.ndarray) -> np.ndarray:
+    """Advance of the hole in each blow [m], less rounding."""
+    found = blows["hole_advance"]
+    return np.where(np.abs(found) < LEAST_ADVANCE, 0.0, found)
 
 
 def has_stalled(periods: np.ndarray, ended: float, until: float) -> bool:

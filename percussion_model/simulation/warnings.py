@@ -7,7 +7,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from percussion_model.physics.oil import REFERENCE
 from percussion_model.physics.records import EventKind, Mode
+from percussion_model.scene.inputs import PRESSURES
 from percussion_model.scene.rocks import read_rock
 from percussion_model.scene.rocks.breaking import rock_of
 from percussion_model.scene.scales import barrier_shares
@@ -34,8 +36,11 @@ from percussion_model.simulation.validity import (
 MOST_WAVE_SPEED_ERROR = 1e-3
 # A rotation that is slower does not turn [rad/s].
 STANDING = 1e-2
-# A supply below this share of what it is set to is starved.
-STARVED = 0.95
+# A supply below this share of what it is set to is starved, and one that gives more than it gets,
+# but for what a few blows differ by.
+STARVED, EVEN = 0.95, 1.02
+# Ports of chambers of air, by their edges from the bit up (Bo et al. 2021, table 1).
+PORTS = ("upper_exhaust", "lower_intake", "upper_intake", "lower_exhaust")
 # A rear chamber of oil is below the pressure around it for about 3 % of the time, as measured; an
 # accumulator is never empty.
 MOST_VOID, MOST_EMPTY = 0.1, 0.01
@@ -46,6 +51,8 @@ FED = 0.6
 MOST_OFF = 0.01
 # No hammer takes so long for a blow [s].
 SLOWEST = 0.4
+# More keys of a table are told by its name.
+MOST_NAMED = 8
 # Entries of the ledger that put energy in.
 _FLOWS = ("initial", "drive", "feed", "gravity")
 
@@ -93,7 +100,14 @@ def _about_scene(result: Result) -> Iterator[str]:
 
 def unused_note(keys: Iterable[str]) -> str:
     """Say that parameters were given that nothing of the scene needs."""
-    return f"given, but without effect in this scene: {', '.join(keys)}"
+    tables: dict[str, list[str]] = {}
+    for key in keys:
+        tables.setdefault(key.rpartition(".")[0], []).append(key)
+    told = (
+        ", ".join(found) if len(found) <= MOST_NAMED else f"{table} ({len(found)} keys)"
+        for table, found in tables.items()
+    )
+    return f"given, but without effect in this scene: {', '.join(told)}"
 
 
 def least_loss_time(result: Result) -> float:
@@ -134,7 +148,7 @@ def _about_blows(result: Result) -> Iterator[str]:
     if result.scene.piston.model == "absent":
         yield "there is no piston, so there are no blows: the rate of penetration is undefined"
     elif len(result.blows) == 0:
-        stalled = result.scene.effects.drive == "pneumatic" and result.duration > SLOWEST
+        stalled = result.scene.effects.drive in PRESSURES and result.duration > SLOWEST
         yield (
             "the hammer has stalled: " * stalled
             + "no whole blow in this run: the rate of penetration is undefined"
@@ -154,8 +168,6 @@ def _about_blows(result: Result) -> Iterator[str]:
             "not known" * (count > 0) + "; run longer"
         )
     yield from _about_flight(result)
-    yield from _about_supply(result)
-    yield from _about_oil(result)
     rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
     if _stands(result):
         yield "the bit does not turn: it meets its own craters, and the hole does not advance"
@@ -168,16 +180,30 @@ def _about_blows(result: Result) -> Iterator[str]:
 
 
 def _about_supply(result: Result) -> Iterator[str]:
-    """Say that a hammer is starved of air."""
+    """Say that a hammer is starved of air, and what is odd about its ports."""
     if result.scene.effects.drive != "pneumatic":
         return
-    set_to, found = result.scene["pneumatic.supply_pressure"], result.hammer_pressure
-    if found < STARVED * set_to:
+    scene, blows = result.scene, result.counted
+    set_to, found = scene["pneumatic.supply_pressure"], result.hammer_pressure
+    most, volume = scene["pneumatic.supply_flow"], scene["pneumatic.supply_volume"]
+    ordered = [scene[f"pneumatic.{port}_edge"] for port in PORTS]
+    if ordered != sorted(ordered):
+        edges = ", ".join(f"pneumatic.{port}_edge" for port in PORTS)
+        yield f"edges of ports are out of order, which is from the bit up {edges}: air is wasted"
+    if missing := [f"pneumatic.{port}" for port in PORTS if scene[f"pneumatic.{port}"] == 0.0]:
+        yield f"ports are missing ({', '.join(missing)} = 0 m^2): chambers live on leaks"
+    falls = len(blows) > 0 and 0.0 < EVEN * most < float(blows["pneumatic_air"].mean())
+    if most > 0.0 == volume:
+        yield (
+            "pneumatic.supply_flow has no effect with pneumatic.supply_volume = 0 m^3, which never "
+            "falls in pressure: give a volume above 0 m^3, as of the hose"
+        )
+    elif falls or found < STARVED * set_to:
         yield (
             "the hammer is starved: the compressor gives too little air (pneumatic.supply_flow), "
             f"and the supply has fallen to {in_digits(found / 1e5)} bar, where "
-            f"{in_digits(set_to / 1e5)} bar are set; while it still falls a longer run.duration "
-            "gives a lower rate"
+            f"{in_digits(set_to / 1e5)} bar are set; while it falls no two blows are alike, and a "
+            "longer run has a lower rate"
         )
 
 
@@ -185,7 +211,8 @@ def _about_oil(result: Result) -> Iterator[str]:
     """Say that oil does what it should not."""
     if result.scene.effects.drive != "hydraulic" or not result.end:
         return
-    set_to, found = result.scene["hydraulic.supply_pressure"], result.end["hydraulic_pressure"]
+    scene = result.scene
+    set_to, found = scene["hydraulic.supply_pressure"], result.end["hydraulic_pressure"]
     if 0.0 < found < FED * set_to:
         yield (
             "the hammer is starved: the pump gives too little oil (hydraulic.flow), at a mean of "
@@ -205,9 +232,13 @@ def _about_oil(result: Result) -> Iterator[str]:
             "oil: forces are held too long (hydraulic.step; or bodies that are rigid)"
         )
     if empty > MOST_EMPTY:
+        least = scene["hydraulic.precharge"] - REFERENCE
         yield (
             f"the accumulator is empty for {in_digits(100.0 * empty, 2)} % of the time: the line "
             "is below its precharge (hydraulic.precharge)"
+            + ", where blows are irregular or none: hydraulic.supply_pressure = "
+            f"{in_digits(set_to / 1e5)} bar must be {in_digits(least / 1e5)} bar at least"
+            * (set_to < least)
         )
 
 
@@ -237,6 +268,8 @@ def _about_flight(result: Result) -> Iterator[str]:
 
 
 def _about_validity(result: Result) -> Iterator[str]:
+    yield from _about_supply(result)
+    yield from _about_oil(result)
     if any(result.energy[name] for name in _FLOWS):
         yield from ledger_note(result.energy["residual_relative"])
         yield from numerical_note(result.energy["numerical_relative"], result.solver)

@@ -269,7 +269,8 @@ def test_a_supply_that_is_cut_lets_the_hammer_die_and_one_too_small_starves_it()
 
 
 HARD = {
-    "dead volume of a hundredth": {"lower_volume": 2.7e-6},
+    "dead volume of a thousandth": {"lower_volume": 2.7e-7},
+    "a compressor at 70 %": {"supply_volume": 5e-3, "supply_flow": 0.7 * 21.4 * FREE_AIR / 60},
     "no supply": {"supply_pressure": 0.0},
     "little supply": {"supply_pressure": 3e5},
     "100 bar": {"supply_pressure": 100e5},
@@ -289,10 +290,25 @@ HARD = {
     "a compressor of nothing": {"supply_volume": 1e-4, "supply_flow": 1e-9},
     "long steps": {"step": 1e-3},
 }
+ODD = {
+    "no supply": "the hammer has stalled",
+    "reversed ports": "edges of ports are out of order",
+    "no return ports": "ports are missing (pneumatic.upper_exhaust, pneumatic.lower_exhaust",
+    "a compressor at 70 %": "the hammer is starved",
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_what_is_odd_of_air_is_told(name):
+    changes = {f"pneumatic.{key}": value for key, value in HARD[name].items()}
+    found = simulate(drilling("rigid", **changes), 0.5)
+    assert any(text.startswith(ODD[name]) for text in found.warnings), found.warnings
+    usual = simulate(drilling("rigid"), 0.5).warnings
+    assert not any(text.startswith(told) for told in ODD.values() for text in usual)
 
 
 @pytest.mark.parametrize("name", HARD)
-@pytest.mark.parametrize("gap", [1e-5, 0.047, 0.12])
+@pytest.mark.parametrize("gap", [1e-5, 0.03, 0.047, 0.07, 0.12])
 def test_hard_cases_end_well(name, gap):
     changes = {f"pneumatic.{key}": value for key, value in HARD[name].items()}
     # a piston that is thrown up at first meets the end of its chamber

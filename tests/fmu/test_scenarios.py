@@ -168,16 +168,16 @@ def test_compressor_too_small(air_hammer, fmus, tmp_path):
 
 
 def test_hammer_at_altitude(air_hammer, fmus, tmp_path):
-    """Gauge pressure decides; free air goes with the pressure of the place, as work by its log."""
+    """Gauge pressure decides; air taken in goes with that of the place, as work by its log."""
     found = hammer_at_altitude.simulate(air_hammer, fmus / "Supply.fmu", (0.0, 3000.0))
     assert hammer_at_altitude.draw(found, tmp_path / "high.png").stat().st_size > 20_000
-    thin = hammer_at_altitude.ambient(3000.0)
+    thin = hammer_at_altitude.atmosphere(3000.0)[0]
     assert thin == pytest.approx(70_108.0, rel=1e-4)  # ISO 2533
     ratio = {name: column[1] / column[0] for name, column in found.items() if name != "height"}
     # an independent model of this hammer: 0.6 % less air, equal power
     assert ratio["air"] == pytest.approx(1.0 - 0.006, abs=0.003)
     assert ratio["power"] == pytest.approx(1.0, abs=0.01)
-    assert ratio["free_air"] == pytest.approx(ratio["air"] * 101_325.0 / thin, rel=5e-3)
+    assert ratio["intake"] == pytest.approx(ratio["air"] * 101_325.0 / thin, rel=5e-3)
     work = [math.log((24e5 + around) / around) for around in (101_325.0, thin)]
     assert ratio["compressor"] == pytest.approx(ratio["air"] * work[1] / work[0], rel=5e-3)
 

@@ -72,6 +72,7 @@ def test_it_beats_as_a_hammer_alone_under_the_same_pressures(drilled):
 def test_a_compressor_that_is_too_small_starves_the_hammer(archive, drilled):
     """Pressure falls by what is missing: p' = R T (q_c - q_d) / (V_1 + V_2)."""
     found = Coupling(archive, {"supply.compressor.flow_limit": 0.1}).run(1.5, 1e-3, SIGNALS)
+    assert found.verdict.word == "balanced"
     used = np.ptp(found["hammer.pneumatic.consumed"][500:1400])
     fall = 287.05 * 300.0 * (0.1 * 0.9 - used) / 0.32
     pressure = found["supply.hose_pressure"]

@@ -117,6 +117,8 @@ _DURATION = "Simulated time, in s or with its unit."
 Duration = Annotated[float | None, number_option("--duration", "TIME", "run.duration", _DURATION)]
 _SETTLE = "Time before blows count, in s or with its unit."
 Settle = Annotated[float | None, number_option("--settle", "TIME", "run.settle", _SETTLE)]
+_ALTITUDE = "Height above the sea, by the standard atmosphere: pressure and temperature around."
+Altitude = Annotated[float | None, number_option("--altitude", "HEIGHT", "start.depth", _ALTITUDE)]
 JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE|-", help="Write the summary as JSON; - for stdout."),

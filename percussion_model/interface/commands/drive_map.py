@@ -1,7 +1,8 @@
-"""Command `drive-map`: the pressure law that stands for chambers of air."""
+"""Command `drive-map`: the pressure law that stands for chambers of air or oil."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,8 +57,8 @@ def drive_map(
     ] = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """Tabulate the pressure law that stands for chambers of air, and its errors."""
-    from percussion_model.analysis.drive_map import REBOUNDS, SUPPLY
+    """Tabulate the pressure law that stands for chambers of air or oil, and its errors."""
+    from percussion_model.analysis.drive_map import REBOUNDS
     from percussion_model.analysis.drive_map import drive_map as find
     from percussion_model.interface.progress import progress
     from percussion_model.scene.units import has_unit
@@ -68,7 +69,7 @@ def drive_map(
     parts = (pressures or "").replace(":", ",").split(",")
     if pressures is not None and not any(has_unit(one.strip()) for one in parts):
         raise common.refusal(f"--pressures {pressures}: give each value its unit, as 10bar,24bar")
-    columns = _values("--pressures", SUPPLY, pressures)
+    columns = _values("--pressures", "pneumatic.supply_pressure", pressures)
     across = _values("--rebounds", "contact.restitution", rebounds) or REBOUNDS
     common.tell_of_compiling(chosen.solver_name, "rigid")
     with progress("running chambers") as report:
@@ -79,7 +80,8 @@ def drive_map(
         common.list_files([common.write_file(out, csv_text(found))])
     common.write_json(json_file, plain(found))
     if json_file != "-":
-        show(found, chosen.feed.force if chosen.effects.feed else 0.0)
+        feed = chosen.feed.force if chosen.effects.feed else 0.0
+        show(found, feed if chosen.effects.drive == "pneumatic" else math.inf)
 
 
 def _values(option: str, key: str, text: str | None) -> list[float] | None:

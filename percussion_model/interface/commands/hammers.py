@@ -123,7 +123,9 @@ def number_cells(one: Number, at: float | None = None) -> tuple[str, str]:
 
 def details(one: StoredHammer) -> Iterable[tuple[str, str]]:
     """Go through all that is known of a hammer, as names and texts."""
+    from percussion_model.scene.hammers import CHAMBER_FILES, CHAMBERS
     from percussion_model.scene.hammers.library import sources
+    from percussion_model.scene.text import read_toml
 
     yield "Driven by", one.kind
     for number in one.figures:
@@ -136,6 +138,9 @@ def details(one: StoredHammer) -> Iterable[tuple[str, str]]:
         yield words, f"{text}, follows: {other.why}"
     if one.scene:
         yield "Scene", one.scene
+    for name, file in CHAMBERS.items():
+        if read_toml(CHAMBER_FILES / f"{file}.toml")["hammer"] == one.name:
+            yield "Chambers, estimated", f"percussion new --hammer {name} --pressure"
     if one.note:
         yield "Note", one.note
     for key in _read(one):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from percussion_model.interface.commands import common
-from percussion_model.scene.hammers import hammers
+from percussion_model.scene.hammers import at_altitude, hammers
 
 if TYPE_CHECKING:
     from percussion_model.analysis.rock_interval import RateInterval
@@ -33,6 +33,7 @@ def run(
     settings: common.Settings = None,
     rock: common.RockName = None,
     bit: common.BitName = None,
+    altitude: common.Altitude = None,
     trace: Annotated[
         float | None,
         typer.Option("--trace", metavar="DT", help="Keep a trace, sampled every DT, in s."),
@@ -56,6 +57,7 @@ def run(
     from percussion_model.simulation.simulate import simulate
 
     chosen = common.load_scene(scene, solver, cells, settings, accuracy, check, rock=rock, bit=bit)
+    chosen = chosen if altitude is None else at_altitude(chosen, altitude)
     common.check_outputs(out, json_file)
     made_from = _made_from(chosen, duration, settle)
     made_from |= {"trace": trace, "error_estimate": error_estimate}
@@ -242,6 +244,7 @@ def new(
             help="Air or oil in the chambers of a hammer, at a pressure as '24 bar'.",
         ),
     ] = None,
+    altitude: common.Altitude = None,
     kind: Annotated[
         Literal["hammer", "hopkinson"],
         typer.Option("--kind", help="hammer, or hopkinson: a striker, a bar and rock."),
@@ -276,6 +279,7 @@ def new(
     else:
         scene = Scene(title=_NEW_TITLE)
     scene = common.with_bit(scene, bit)
+    scene = scene if altitude is None else at_altitude(scene, altitude)
     if changes := common.rock_changes(rock, scene):
         scene = scene.replace(**changes)
         if pressure is not None:

@@ -14,6 +14,8 @@ _HERE = Path(__file__).parent
 CHAMBER_FILES = _HERE / "chambers"
 # A top hammer has so many rods where nothing else is asked for.
 USUAL_RODS = 4
+# No temperature falls beyond this height, and none is drilled at [m].
+HIGHEST = 11e3
 # Hammers with air or oil in their chambers, and whose of `chambers` these are.
 AIR = {
     "dth3": "sandvik-3-5-inch",
@@ -105,6 +107,25 @@ def _law(name: str, pressure: float) -> dict[str, float]:
         "drive.force": round(force * max(pressure, 0.0) / known, 1),
         "drive.reversal_distance": round(distance, 6),
     }
+
+
+def atmosphere(height: float) -> tuple[float, float]:
+    """Pressure [Pa] and temperature [K] of the standard atmosphere, ISO 2533, at a height [m]."""
+    share = 1.0 - 2.25577e-5 * height
+    return round(101_325.0 * share**5.25588, 1), round(288.15 * share, 2)
+
+
+def at_altitude(scene: Scene, height: float) -> Scene:
+    """Return the scene of a hammer with air in its chambers at a height above the sea [m].
+
+    Pressures of the supply are above that of the surroundings, a compressor's flow is by mass.
+    """
+    if scene.effects.drive != "pneumatic":
+        raise SceneError('altitude: needs air in chambers, effects.drive = "pneumatic"')
+    if not -1000.0 <= height <= HIGHEST:
+        raise SceneError(f"altitude = {height:g} m: must be a number from -1000 to {HIGHEST:g} m")
+    values = zip(("pressure", "temperature"), atmosphere(height), strict=True)
+    return scene.replace(**{f"pneumatic.ambient_{name}": value for name, value in values})
 
 
 def bar_test() -> Scene:
