@@ -30,6 +30,8 @@ FEEDS = {
     "dth5": (8300.0, 13500.0),
     "dth6": (9700.0, 18100.0),
 }
+# The ranges are for all pressures: the least goes with the lowest, as 12 bar by 20. Assumed.
+LOW = 0.6
 DURATION, SETTLE = 20.0, 1.0
 RPM = 2.0 * math.pi / 60.0
 SPEEDS = (0.5, 1, 2, 3, 5, 7, 10, 14, 20, 28, 40, 55, 75, 100)
@@ -139,16 +141,18 @@ def string(scene: Scene, length: float) -> dict[str, float]:
 
 def torques(scenes: list[Scene], least: float, most: float) -> str:
     """Torques at makers' least feed, that of the scene and the greatest, means of scenes."""
-    found = []
-    for feed in (least, scenes[0].feed.force, most):
-        told = [summary_of(one, **{"feed.force": feed})["rotation_torque"] for one in scenes]
+    drive, found = scenes[0].drive.force, []
+    for share, feed in ((LOW, least), (1.0, least), (1.0, scenes[0].feed.force), (1.0, most)):
+        changes = {"drive.force": share * drive, "feed.force": feed}
+        told = [summary_of(one, **changes)["rotation_torque"] for one in scenes]
         found.append(f"{np.mean(told):.0f}")
     return ", ".join(found)
 
 
 FEED_HEADINGS = (
     "hammer", "rock", "feed, recoil to 0.8 of the motor, kN", "mean m/h", "least / most, %",
-    "m/h at six times the first", "torque, N m, at makers' least, own and the greatest feed",
+    "m/h at six times the first",
+    "torque, N m, at makers' least feed with 0.6 of the drive, with all of it, own, greatest feed",
     "the same with strings of 5 to 80 m that twist, mean",
 )  # fmt: skip
 HEADINGS = (
