@@ -50,9 +50,9 @@ def rate_of(*arguments, **changes):
     return HOUR * rate_of_blows(blows_of(*arguments, changes=tuple(changes.items())))[0]
 
 
-def with_feed(feed, **changes):
-    """The 5 inch hammer in granite at a feed [N]; its blows."""
-    return blows_of("dth5", changes=(("feed.force", feed), *changes.items()))
+def with_feed(feed, kind="kuru-granite", **changes):
+    """The 5 inch hammer at a feed [N]; its blows."""
+    return blows_of("dth5", kind, changes=(("feed.force", feed), *changes.items()))
 
 
 def advance_of(blows):
@@ -61,10 +61,10 @@ def advance_of(blows):
 
 
 @cache
-def recoil():
+def recoil(kind="kuru-granite"):
     """Feed on the casing of the 5 inch hammer that balances its recoil [N]."""
-    blows = blows_of("dth5")
-    scene = scene_in("dth5", "kuru-granite")
+    blows = blows_of("dth5", kind)
+    scene = scene_in("dth5", kind)
     weight = scene["feed.casing_mass"] * scene.gravity.acceleration
     return blows["drive_impulse"].sum() / blows["period"].sum() - weight
 
@@ -123,19 +123,21 @@ def test_cycles_below_the_threshold_hardly_advance_the_hole(name, kind):
 # ------------------------------------------------------------------- rotation
 
 
-def at_index(index):
-    """Rate at a gauge index [m]: what the gauge turns in a blow."""
-    blows = blows_of("dth5")
+def at_index(index, *of):
+    """Rate of a hammer in a rock at a gauge index [m]: what the gauge turns in a blow."""
+    blows = blows_of(*of)
     frequency = 1.0 / blows["period"].mean()
-    radius = 0.5 * scene_in("dth5", "kuru-granite").hole_diameter
-    return rate_of("dth5", **{SPEED: index * frequency / radius})
+    radius = 0.5 * scene_in(*of).hole_diameter
+    return rate_of(*of, **{SPEED: index * frequency / radius})
 
 
-def test_rate_has_a_plateau_in_rpm_and_falls_where_the_bit_hardly_turns():
-    plateau = at_index(30e-3)
+@pytest.mark.parametrize("kind", ROCKS)
+@pytest.mark.parametrize("name", LEAST_FEED)
+def test_rate_has_a_plateau_in_rpm_and_falls_where_the_bit_hardly_turns(name, kind):
+    plateau = at_index(30e-3, name, kind)
     for index in (8e-3, 10e-3, 12e-3, 15e-3):
-        assert at_index(index) >= 0.85 * plateau
-    assert at_index(0.5e-3) < 0.5 * plateau
+        assert at_index(index, name, kind) >= 0.85 * plateau
+    assert at_index(0.5e-3, name, kind) < 0.5 * plateau
 
 
 # ------------------------------------------------------------------- feed and torque
@@ -149,11 +151,12 @@ def test_makers_feed_begins_about_at_recoil(name):
     assert 0.4 < force / LEAST_FEED[name] < 1.1
 
 
-def test_rate_hardly_depends_on_feed_from_recoil_to_what_the_motor_bears():
+@pytest.mark.parametrize("kind", ROCKS)
+def test_rate_hardly_depends_on_feed_from_recoil_to_what_the_motor_bears(kind):
     motor = {"rotation.stall_torque": STALL, "rotation.full_torque": FULL}
-    rates, feed = [], recoil()
+    rates, feed = [], recoil(kind)
     while True:
-        blows = with_feed(feed, **motor)
+        blows = with_feed(feed, kind, **motor)
         if blows["rotation_torque"].max() > 0.8 * STALL:
             break
         rates.append(advance_of(blows))
