@@ -30,11 +30,18 @@ FEEDS = {
     "dth5": (8300.0, 13500.0),
     "dth6": (9700.0, 18100.0),
 }
+# The ranges are for all pressures: the least goes with the lowest, as 12 bar by 20. Assumed.
+LOW = 0.6
 DURATION, SETTLE = 20.0, 1.0
 RPM = 2.0 * math.pi / 60.0
 SPEEDS = (0.5, 1, 2, 3, 5, 7, 10, 14, 20, 28, 40, 55, 75, 100)
 CASING_FEEDS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 15, 18, 21, 24, 27, 30, 34, 38)
 MOTORS = (600.0, 900.0)
+# Of a motor that fits each [N m], assumed, and torque by it up to which it holds its speed.
+STALLS, FULL = {"dth3": 300.0, "dth4": 600.0, "dth5": 900.0, "dth6": 1500.0}, 0.8
+# Of a pipe of 102 mm with walls of 6 mm on a hole of 140 mm [N m^2], by the fourth power of the
+# diameter on others; lengths of it [m]; radius of gyration of a casing by that diameter. Assumed.
+PIPE, PIPE_ON, LENGTHS, GYRATION = 3.3e5, 0.14, (5.0, 10.0, 20.0, 40.0, 80.0), 0.4
 INDEX = (8.0, 15.0)  # usual on the gauge circle [mm]
 
 
@@ -85,11 +92,69 @@ def recoil_share(name: str, scene: Scene, told: dict[str, Any]) -> str:
     """Recoil by the least feed that makers recommend."""
     if name not in FEEDS:
         return "-"
-    # over a blow piston and drive are balanced by the contact
-    recoil = told["mean_contact_force"] - scene.piston.mass * scene.gravity.acceleration
-    return f"{recoil / FEEDS[name][0]:.2f}"
+    return f"{recoil_of(scene, told) / FEEDS[name][0]:.2f}"
 
 
+def recoil_of(scene: Scene, told: dict[str, Any]) -> float:
+    """Mean force of the drive [N]: over a blow piston and drive are balanced by the contact."""
+    weight = scene.piston.mass * scene.gravity.acceleration
+    return float(told["mean_contact_force"]) - weight
+
+
+def feed_rows() -> Iterator[list[str]]:
+    """A row for each hammer down the hole and rock: rates from recoil to the motor, torques."""
+    for name, (least, most) in FEEDS.items():
+        for found in ROCKS:
+            scene = on_rock(found, hammer(name))
+            weight = scene["feed.casing_mass"] * scene.gravity.acceleration
+            feed, rates = recoil_of(scene, summary_of(scene)) - weight, []
+            told = with_motor(scene, feed, STALLS[name])
+            first = feed
+            while told["rotation_torque"] <= 0.8 * STALLS[name]:
+                rates.append(3600.0 * told["rate_of_penetration"])
+                last, feed = feed, 1.15 * feed
+                told = with_motor(scene, feed, STALLS[name])
+            jammed = with_motor(scene, 6.0 * first, STALLS[name])["rate_of_penetration"] or 0.0
+            yield [
+                name,
+                found,
+                f"{1e-3 * first:.1f} to {1e-3 * last:.1f}",
+                f"{np.mean(rates):.1f}",
+                f"{100.0 * (min(rates) / np.mean(rates) - 1.0):+.0f} / "
+                f"{100.0 * (max(rates) / np.mean(rates) - 1.0):+.0f}",
+                f"{3600.0 * jammed:.1f}",
+                torques([scene], least, most),
+                torques([scene.replace(**string(scene, one)) for one in LENGTHS], least, most),
+            ]
+
+
+def string(scene: Scene, length: float) -> dict[str, float]:
+    """A string of that length [m] above the casing."""
+    assert scene.hole_diameter is not None
+    size = scene.hole_diameter
+    arm = GYRATION * size
+    return {
+        "rotation.string_stiffness": PIPE * (size / PIPE_ON) ** 4 / length,
+        "rotation.inertia": scene["feed.casing_mass"] * arm * arm,
+    }
+
+
+def torques(scenes: list[Scene], least: float, most: float) -> str:
+    """Torques at makers' least feed, that of the scene and the greatest, means of scenes."""
+    drive, found = scenes[0].drive.force, []
+    for share, feed in ((LOW, least), (1.0, least), (1.0, scenes[0].feed.force), (1.0, most)):
+        changes = {"drive.force": share * drive, "feed.force": feed}
+        told = [summary_of(one, **changes)["rotation_torque"] for one in scenes]
+        found.append(f"{np.mean(told):.0f}")
+    return ", ".join(found)
+
+
+FEED_HEADINGS = (
+    "hammer", "rock", "feed, recoil to 0.8 of the motor, kN", "mean m/h", "least / most, %",
+    "m/h at six times the first",
+    "torque, N m, at makers' least feed with 0.6 of the drive, with all of it, own, greatest feed",
+    "the same with strings of 5 to 80 m that twist, mean",
+)  # fmt: skip
 HEADINGS = (
     "hammer", "rock", "m/h", "blow, J", "MJ/m³", "gauge index, mm", "torque, N m", "K ± 5 %, %",
     "recoil by least feed",
@@ -112,18 +177,17 @@ def over_rotation(scene: Scene) -> list[dict[str, float]]:
     return rows
 
 
+def with_motor(scene: Scene, feed: float, stall: float) -> dict[str, Any]:
+    """Summary of a run at a feed [N] with a motor that stalls at a torque [N m]."""
+    motor = {"rotation.stall_torque": stall, "rotation.full_torque": FULL * stall}
+    return summary_of(scene, **{"feed.force": feed, **motor})
+
+
 def over_feed(scene: Scene, motor: float) -> list[dict[str, float]]:
     """Rate and torque over the feed on the casing, with a motor of a torque [N m]."""
     rows = []
     for feed in CASING_FEEDS:
-        told = summary_of(
-            scene,
-            **{
-                "feed.force": 1e3 * feed,
-                "rotation.stall_torque": motor,
-                "rotation.full_torque": 0.8 * motor,
-            },
-        )
+        told = with_motor(scene, 1e3 * feed, motor)
         rate = told["rate_of_penetration"] or 0.0
         rows.append(
             {"feed": feed, "rate": 3600.0 * rate, "torque": told["rotation_torque"] or math.nan}
@@ -167,7 +231,11 @@ def main() -> None:
     draw_rotation(left, over_rotation(scene))
     draw_feed(right, {motor: over_feed(scene, motor) for motor in MOTORS})
     style.save_png(figure, DOCS / "images" / "breaking.png", 110)
-    publish({"presets": lambda: table(HEADINGS, preset_rows())}, DOCS / "breaking.md")
+    blocks = {
+        "presets": lambda: table(HEADINGS, preset_rows()),
+        "feeds": lambda: table(FEED_HEADINGS, feed_rows()),
+    }
+    publish(blocks, DOCS / "breaking.md")
 
 
 if __name__ == "__main__":

@@ -7,19 +7,79 @@ only the static force F_0 presses on it between blows,
 
     T = r (F c/s + mu F_0)
 
-(eq. 20i). The motor's speed falls with the torque, to zero where it stalls.
+(eq. 20i). The motor's speed falls with the torque, to zero where it stalls. A string between them
+may twist: each blow stops the bit, which then rests until the string's torque is T, and swings on
+under both (eq. 20j).
 """
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 from percussion_model.components import Component
-from percussion_model.physics.elementary import exp
+from percussion_model.physics.elementary import atan2, cos_and_sin, exp
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined
+
+# A turn by less is rounding [rad].
+LEAST_TURN = 1e-12
+
+
+class Turn(NamedTuple):
+    """What the bit does on a string that twists, from one blow to the next."""
+
+    angle: float  # by which it turns [rad]
+    twist: float  # of the string at the end [rad]
+    torque: float  # of the string, its mean [N m]
+    speed: float  # of the bit when the next blow stops it [rad/s]
+
+
+@inlined
+def twists(par):
+    """Whether the string twists."""
+    return par.rotation_string_stiffness > 0.0
+
+
+@inlined
+def turn(par, s, period):
+    """The bit's turn in a period that it begins at rest, against the torque of the last blow.
+
+    It does not turn back.
+    """
+    stiffness = max(par.rotation_string_stiffness, LEAST_DIVISOR)
+    inertia = max(par.rotation_inertia, LEAST_DIVISOR)
+    motor, needed = s.rotation_turning_speed, s.rotation_needed_torque
+    stall, rate = par.rotation_stall_torque, math.sqrt(stiffness / inertia)
+    twist, held = s.rotation_twist, needed / stiffness
+    angle, speed, impulse, left = 0.0, 0.0, 0.0, period
+    for _ in range(2):  # a bit that has come to rest by itself swings on without another rest
+        if left > 0.0:
+            time = left
+            if stall == 0.0 or needed < stall:
+                time = min(max(held - twist, 0.0) / max(motor, LEAST_DIVISOR), left)
+            impulse += stiffness * (twist + 0.5 * motor * time) * time
+            twist, left, speed = twist + motor * time, left - time, 0.0
+        if left > 0.0:
+            time, off = left, twist - held
+            if off > LEAST_TURN:
+                time = min((math.pi + 2.0 * atan2(motor, rate * off)) / rate, left)
+            c, sine = cos_and_sin(rate * time)
+            after = off * c + motor / rate * sine
+            speed = max(motor * (1.0 - c) + rate * off * sine, 0.0)
+            angle += motor * time - (after - off)
+            impulse += needed * time + inertia * speed
+            twist, left = held + after, left - time
+    angle, torque = angle if angle > LEAST_TURN else 0.0, impulse / max(period, LEAST_DIVISOR)
+    if stall > 0.0:
+        twist, torque = min(twist, stall / stiffness), min(torque, stall)
+    return Turn(angle, twist, torque, speed)
 
 
 @inlined
 def arc(par, s, period):
     """Arc at the mean radius of the buttons in a time [m]."""
+    if twists(par):
+        return par.rotation_mean_radius * turn(par, s, period).angle
     return par.rotation_mean_radius * s.rotation_turning_speed * period
 
 
@@ -54,17 +114,23 @@ def next_blow(par, s, period, kept, rest, push, climb):
         slope = s.pit / max(fading(par), LEAST_DIVISOR)  # on which it would begin to climb
     rubbing = par.rotation_friction * max(rest, 0.0)
     needed = radius * (max(push, 0.0) * slope + rubbing)
+    stall, at_motor, lost = par.rotation_stall_torque, needed, 0.0
+    if twists(par):
+        turned = turn(par, s, period)
+        s.rotation_twist, at_motor = turned.twist, turned.torque
+        s.rotation_angle += turned.angle
+        lost = 0.5 * par.rotation_inertia * turned.speed * turned.speed
+    else:
+        s.rotation_angle += s.rotation_turning_speed * period
     s.rotation_needed_torque = needed
-    stall = par.rotation_stall_torque
-    s.rotation_torque = min(needed, stall) if stall > 0.0 else needed
-    s.rotation_angle += s.rotation_turning_speed * period
+    s.rotation_torque = min(at_motor, stall) if stall > 0.0 else at_motor
     s.rotation_index = way
-    s.e_turning += rubbing * way
-    s.e_friction += rubbing * way
+    s.e_turning += rubbing * way + lost
+    s.e_friction += rubbing * way + lost
     follows = 1.0
     if par.rotation_response > 0.0:
         follows = 1.0 - exp(-period / max(par.rotation_response, LEAST_DIVISOR))
-    off = motor_speed(par, s, needed) - s.rotation_turning_speed
+    off = motor_speed(par, s, at_motor) - s.rotation_turning_speed
     s.rotation_turning_speed += follows * off
 
 
@@ -99,12 +165,27 @@ COMPONENT = Component(
             1e9,
         ),
         "full_torque": (0.0, "N m", "torque up to which the motor holds its speed", 0.0, 1e9),
+        "string_stiffness": (
+            0.0,
+            "N m/rad",
+            "torque by twist of the string between motor and bit; 0: it does not twist",
+            0.0,
+            1e12,
+        ),
+        "inertia": (
+            0.0,
+            "kg m^2",
+            "moment of inertia of the bit and of what turns with it below the string",
+            0.0,
+            1e6,
+        ),
         "response": (0.1, "s", "time in which the speed follows; 0: from blow to blow", 0.0, 1e3),
     },
     state={
         "angle": ("rad", "angle turned since the start, up to the present blow", 0.0),
-        "turning_speed": ("rad/s", "speed of the bit's rotation", "speed"),
-        "torque": ("N m", "torque of the rotation in the last blow", 0.0),
+        "turning_speed": ("rad/s", "speed of the rotation, that of its motor", "speed"),
+        "twist": ("rad", "twist of the string when the last blow began", 0.0),
+        "torque": ("N m", "torque of the rotation, that of its motor, in the last blow", 0.0),
         "needed_torque": ("N m", "torque that rotation needs, more than the motor's in a jam", 0.0),
         "index": ("m", "arc at the mean radius in the last blow", 0.0),
     },

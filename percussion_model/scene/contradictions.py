@@ -39,6 +39,7 @@ class Rule(IntEnum):
     ROTATION_AND_CUTTINGS = 21
     CASING_AND_DAMPER = 22
     MOTOR = 23
+    STRING_WITHOUT_INERTIA = 24
 
 
 _OF_STRING = (
@@ -129,6 +130,10 @@ TEXTS = {
     Rule.MOTOR: (
         "rotation.full_torque = {rotation.full_torque!r} N m: must be at most "
         "rotation.stall_torque = {rotation.stall_torque!r} N m"
+    ),
+    Rule.STRING_WITHOUT_INERTIA: (
+        "rotation.string_stiffness = {rotation.string_stiffness!r} N m/rad needs rotation.inertia, "
+        "the moment of inertia that it turns: give it, or set rotation.string_stiffness = 0"
     ),
     Rule.SETTLE: ("run.settle = {run.settle!r} s: must be below run.duration = {run.duration!r} s"),
 }
@@ -225,6 +230,8 @@ def _in_breaking(v: Any) -> Rule:
             return Rule.ROTATION_AND_CUTTINGS
         if v.rotation_stall_torque > 0.0 and v.rotation_full_torque > v.rotation_stall_torque:
             return Rule.MOTOR
+        if v.rotation_string_stiffness > 0.0 and v.rotation_inertia == 0.0:
+            return Rule.STRING_WITHOUT_INERTIA
     return Rule.NOTHING
 
 

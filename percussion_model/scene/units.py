@@ -83,6 +83,10 @@ QUANTITIES = {
     "m/s^2": Quantity("an acceleration", ("9.81", "32.19 ft/s^2"), ("mm/s^2", "ft/s^2")),
     "rad/s": Quantity("a speed of rotation", ("5.655", "54 rpm"), ("rpm", "deg/s")),
     "N m": Quantity("a torque", ("600", "0.6 kN m", "442.5 ft lbf"), ("kN m", "ft lbf")),
+    "N m/rad": Quantity(
+        "a stiffness of a twist", ("7000", "7 kN m/rad", "122.2 N m/deg"), ("kN m/rad", "N m/deg")
+    ),
+    "kg m^2": Quantity("a moment of inertia", ("0.2", "2000 kg cm^2"), ("kg cm^2", "g m^2")),
     "m^3": Quantity("a volume", ("5e-6", "5 cm^3"), ("cm^3", "l", "in^3")),
     "m^3/s": Quantity("a flow", ("0.001", "60 l/min"), ("l/min", "m^3/min", "cm^3/s")),
     "m^3/s/Pa": Quantity("a leakage", ("1.5e-12", "1.5 cm^3/s/MPa"), ("cm^3/s/MPa", "l/min/bar")),

@@ -307,7 +307,7 @@ def _about_breaking(result: Result) -> Iterator[str]:
         by_law = result.scene.effects.drive == "pressure"
         yield from recoil_note(on_piston + on_bit, held, by_law)
     energy = by_volume(numbers_over(blows), scene.hole_diameter).get("specific_energy")
-    if energy is not None and energy > 0.0 and (named := rock_of(scene)):
+    if energy is not None and energy > 0.0 and (named := rock_of(scene, ("rock.",))):
         strength = read_rock(named).strength
         if strength is not None:
             yield from specific_energy_note(energy, named, strength.value)

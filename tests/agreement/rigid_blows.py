@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 # Looks in a period of the bit on the rock, and looks at once.
@@ -55,6 +56,8 @@ class Law:
     stall: float
     full: float
     response: float
+    string: float
+    inertia: float
 
 
 def law_of(scene) -> Law:
@@ -88,6 +91,8 @@ def law_of(scene) -> Law:
         stall=scene["rotation.stall_torque"],
         full=scene["rotation.full_torque"],
         response=scene["rotation.response"],
+        string=scene["rotation.string_stiffness"],
+        inertia=scene["rotation.inertia"],
     )
 
 
@@ -150,7 +155,9 @@ class Rig:
     parted: bool = False  # the loading under way began at another place
     volume: float = 0.0
     turning: float = 0.0
+    needed: float = 0.0
     torque: float = 0.0
+    twist: float = 0.0
     index: float = 0.0
     last: float = 0.0
     under_way: float = 0.0
@@ -462,6 +469,39 @@ class Rig:
             })  # fmt: skip
         self.start = (self.time, self.depth())
 
+    def rotate(self, period: float) -> tuple[float, float]:
+        """Angle that the bit turns, and mean torque of a string that twists; no motor stalls."""
+        one, left = self.law, period
+        if not one.string:
+            return self.turning * period, 0.0
+        k, twist, angle, wound = one.string, self.twist, 0.0, 0.0  # `wound`: twist by time
+
+        def rates(_, y):
+            return (
+                self.turning - y[1],
+                (k * y[0] - self.needed) / one.inertia,
+                y[1],
+                y[0],
+            )
+
+        def rest(t, y):
+            return y[1] if t > 1e-9 else 1.0
+
+        rest.terminal, rest.direction = True, -1
+        while left > 0.0:
+            wait = min(max(self.needed / k - twist, 0.0) / self.turning, left)
+            wound += wait * (twist + 0.5 * wait * self.turning)
+            twist, left = twist + wait * self.turning, left - wait
+            if left > 0.0:
+                swing = solve_ivp(
+                    rates, (0.0, left), (twist, 0.0, angle, wound), "DOP853",
+                    events=rest, rtol=1e-12, atol=1e-15,
+                )  # fmt: skip
+                twist, _, angle, wound = swing.y[:, -1]
+                left -= swing.t[-1]
+        self.twist = twist
+        return angle, k * wound / period
+
     def move_on(self) -> None:
         """Turn to the next place, and climb out of the craters of this one."""
         one, period = self.law, self.time - self.place[0]
@@ -478,7 +518,8 @@ class Rig:
             self.book()
             carried = min(share * (self.peak**2 - self.began**2), self.crushed)
             self.cycle, self.parted = (self.surface, self.peak), True
-        arc = one.radius * self.turning * period
+        angle, wound = self.rotate(period)
+        arc = one.radius * angle
         kept = math.exp(-0.5 * arc / one.renewal)  # of depth; of energy the square
         if one.old_line and self.peak > 0.0:
             left = max(kept * self.peak, self.spring(self.x) / one.stiffness)
@@ -486,8 +527,11 @@ class Rig:
         climb = (1.0 - kept) * self.pit
         rest = feed + one.bit * one.gravity
         force = max(rest + push + one.piston * one.gravity, 0.0)
-        needed = one.radius * (force * climb / arc + one.friction * max(rest, 0.0))
-        self.torque, self.index = min(needed, one.stall) if one.stall else needed, arc
+        slope = climb / arc if arc else 0.5 * self.pit / one.renewal
+        needed = one.radius * (force * slope + one.friction * max(rest, 0.0))
+        self.needed, self.index = needed, arc
+        needed = wound if one.string else needed
+        self.torque = min(needed, one.stall) if one.stall else needed
         speed = one.speed
         if one.stall and needed > one.full:
             speed *= max(one.stall - needed, 0.0) / (one.stall - one.full)

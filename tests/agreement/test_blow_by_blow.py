@@ -38,6 +38,12 @@ CASES = {
         {"rotation.stall_torque": 200.0, "rotation.full_torque": 60.0},
         50,
     ),
+    "a string that twists": (
+        HAMMER,
+        0.87,
+        {"rotation.string_stiffness": 5000.0, "rotation.inertia": 0.3},
+        50,
+    ),
     "advance by what is pressed in": (REFERENCE, 0.87, {"breaking.crushing_energy": 0.0}, 50),
     "limited by the depth": (REFERENCE, 0.87, {"breaking.crushing_energy": 1e6}, 50),
     "rock met again": (HAMMER, 0.87, OFF | OLD, 12),

@@ -92,7 +92,12 @@ OIL: dict[str, tuple[Any, ...]] = {
     "hydraulic.air": (1e-5, 0.3, ZERO),
     "hydraulic.precharge": (1e5, 5e7),
 }
-BOUNDS = WIDE | ADVANCE | AIR | OIL
+# Of a string that twists, drawn last of all.
+STRING: dict[str, tuple[Any, ...]] = {
+    "rotation.string_stiffness": (1e-3, 1e9),
+    "rotation.inertia": (1e-6, 1e3),
+}
+BOUNDS = WIDE | ADVANCE | AIR | OIL | STRING
 SWITCHES = ("effects.breaking", "effects.rotation")
 # What a scene with breaking or rotation has to be given.
 NO_DEFAULT = ("hole_diameter", "breaking.buttons", "rotation.mean_radius")
@@ -294,6 +299,9 @@ def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
             changes[key] = value
     if is_law and "effects.drive" not in changes and chance(source, 20):
         changes["effects.drive"] = "hydraulic"
+    if changes.get("effects.rotation") and chance(source, 40):
+        for key in STRING:
+            changes[key] = number(source, key, reach) or 1.0
     return scene.replace(**changes)
 
 

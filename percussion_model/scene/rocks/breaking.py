@@ -139,8 +139,14 @@ def parameters_under(rock: Rock, scene: Scene) -> dict[str, Any]:
     return found | {COUNT: buttons}
 
 
-def rock_of(scene: Scene) -> str:
-    """Name of the rock whose law and numbers a scene has, as `read_rock` takes it; or empty."""
+def rock_of(scene: Scene, groups: tuple[str, ...] = ("rock.", "breaking.", "rotation.")) -> str:
+    """Name of the rock whose law and numbers a scene has, as `read_rock` takes it; or empty.
+
+    Parameters
+    ----------
+    groups : tuple of str
+        Keys that have to be the rock's begin with one of these.
+    """
     found = []
     for one in map(rock, rocks()):
         if scene[LAW] != one.law:
@@ -152,6 +158,7 @@ def rock_of(scene: Scene) -> str:
         if count is not None and count != one.buttons and not scene["effects.breaking"]:
             whole = one.of_buttons(count)
         wanted = {**parameters_under(whole, scene), **dict.fromkeys((LAW, COUNT))}
+        wanted = {key: value for key, value in wanted.items() if key.startswith(groups)}
         if all(_same(scene[key], value) for key, value in wanted.items() if value is not None):
             # the rock as it is before others with so many buttons
             found.append((whole.asked or 0, one.name if whole is one else f"{one.name}:{count}"))
