@@ -14,8 +14,9 @@ from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
 STABLE = 2.0
-# Below this one a step is as good by two stages, at its start and in its middle.
-GENTLE = 0.06
+# Steps shorter than this share of the usual ones, which are far from being unstable, are as good
+# by two stages, at the start and in the middle.
+SHORT, GENTLE = 0.25, 0.06
 # Where the stages of a step are, and their shares of it.
 PARTS, SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 # A step ends where a port bends its flow, but for one shorter than this share of it.
@@ -316,7 +317,7 @@ def go(par, supply, hole, y, way):
         if LEAST_PART * h < bend < h:
             h = bend
         here = plus(y, rate, 0.5 * h)
-        if h * rate.rate < GENTLE:
+        if h < SHORT * par.pneumatic_step and h * rate.rate < GENTLE:
             rate = rates_of(par, air, around, middle(way, here, t, h), False)
             end = plus(y, rate, h)
         else:
