@@ -301,9 +301,9 @@ ODD = {
 @pytest.mark.parametrize("name", ODD)
 def test_what_is_odd_of_air_is_told(name):
     changes = {f"pneumatic.{key}": value for key, value in HARD[name].items()}
-    found = simulate(drilling("rigid", **changes), 0.5)
+    found = simulate(drilling("rigid", **changes), 1.5)
     assert any(text.startswith(ODD[name]) for text in found.warnings), found.warnings
-    usual = simulate(drilling("rigid"), 0.5).warnings
+    usual = simulate(drilling("rigid"), 1.5).warnings
     assert not any(text.startswith(told) for told in ODD.values() for text in usual)
 
 
