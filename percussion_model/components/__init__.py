@@ -70,6 +70,8 @@ class Component(NamedTuple):
         slope(par, s) -> how fast the force on the piston changes while it lasts [N/s].
     hidden : tuple of str
         Further fields of the state, which start at 0 and are no columns.
+    usual : mapping of tuple
+        Least and greatest usual value of a parameter: one ten times beyond deserves a hint.
     """
 
     name: str
@@ -91,6 +93,7 @@ class Component(NamedTuple):
     lasts: Callable[..., float] | None = None
     slope: Callable[..., float] | None = None
     hidden: tuple[str, ...] = ()
+    usual: Mapping[str, tuple[float, float]] = _NOTHING
 
     @property
     def fields(self) -> tuple[str, ...]:

@@ -591,6 +591,7 @@ COMPONENT = Component(
         "last_path", "last_v", "used_before", "work_before",
     ),
     pass_time=pass_time,
+    usual={"supply_pressure": (80e5, 250e5)},
     inputs=("flow", "supply_pressure"),
     next_blow=next_blow,
     of_blow=("oil", "pressure"),

@@ -345,9 +345,9 @@ COMPONENT = Component(
     {
         "supply_pressure": (24e5, "Pa", "pressure of the supply at the hammer, above that of the "
                             "surroundings", 0.0, 2e7),
-        "supply_flow": (0.0, "kg/s", "most that the compressor gives; 0: as much as is needed "
-                        "to hold the pressure",
-                        0.0, 1e3),
+        "supply_flow": (0.0, "kg/s", "most that the compressor gives, by mass; as m^3/min free air "
+                        "of 0 C and 101,325 Pa, which is less by mass at a height; 0: as much as "
+                        "is needed to hold the pressure", 0.0, 1e3),
         "supply_volume": (0.2, "m^3", "volume of the supply; 0: its pressure never falls, "
                           "whatever the compressor gives", 0.0, 1e3),
         "supply_temperature": (300.0, "K", "temperature of the supply", 100.0, 2000.0),
@@ -413,6 +413,7 @@ COMPONENT = Component(
         "rest_used", "rest_vented", "rest_brought", "rest_expanded",
     ),
     pass_time=pass_time,
+    usual={"supply_pressure": (6e5, 35e5)},
     inputs=("supply_pressure", "supply_flow", "back_pressure"),
     next_blow=next_blow,
     of_blow=("air",),

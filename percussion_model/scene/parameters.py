@@ -461,7 +461,8 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
             drives[one.name] = one.description
         else:
             switches[one.name] = flag(False, one.description, dict(one.needs))
-        fields = {name: _parameter(*described, needs) for name, described in one.parameters.items()}
+        usual = one.usual.get
+        fields = {name: _parameter(*of, needs, usual(name)) for name, of in one.parameters.items()}
         if fields:
             name_of_class = one.name.title().replace("_", "") + "Group"
             groups[one.name] = _group(name_of_class, Parameters, one.description, fields)
@@ -478,14 +479,14 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
     return groups
 
 
-def _parameter(
-    default: Any, unit: str, description: str, lower: float, upper: float, needs: Needs
-) -> Any:
+def _parameter(default: Any, unit: str, description: str, *of: Any) -> Any:
     """Field of a component's parameter: a flag, a whole number or a number."""
+    lower, upper, needs, usual = of
     if isinstance(default, bool):
         return flag(default, description, needs)
-    kind = count if isinstance(lower, int) else quantity
-    return kind(default, unit, description, needs, ge=lower, le=upper)
+    if isinstance(lower, int):
+        return count(default, unit, description, needs, ge=lower, le=upper)
+    return quantity(default, unit, description, needs, usual, ge=lower, le=upper)
 
 
 def _group(

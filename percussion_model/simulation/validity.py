@@ -181,8 +181,8 @@ def recoil_note(recoil: float, held: float, by_law: bool) -> Iterator[str]:
         then = (
             "so the hammer lifts and has less than its full force"
             if by_law
-            else "so a hammer would lift and lose force; chambers here do not, and less feed "
-            "changes nothing"
+            else "so a real hammer would lift and drill slower; this one, with chambers, does "
+            "not, and its rate is too high"
         )
         yield (
             f"the feed does not hold the casing: the recoil takes all of the {1e-3 * held:.3g} kN "

@@ -171,7 +171,7 @@ def _about_blows(result: Result) -> Iterator[str]:
     rate, scatter = result.rate_of_penetration, result.rate_of_penetration_standard_error
     if _stands(result):
         yield "the bit does not turn: it meets its own craters, and the hole does not advance"
-    elif rate > 0.0 and scatter > LARGE_ERROR * rate:
+    elif rate > 0.0 and scatter > LARGE_ERROR * rate and not _has_jammed(result):
         yield (
             f"blows do not repeat: the rate of penetration has a standard error of "
             f"{in_digits(100.0 * scatter / rate, 2)} %; a longer run.duration (--duration) "
@@ -190,9 +190,15 @@ def _about_supply(result: Result) -> Iterator[str]:
     if ordered != sorted(ordered):
         edges = ", ".join(f"pneumatic.{port}_edge" for port in PORTS)
         yield f"edges of ports are out of order, which is from the bit up {edges}: air is wasted"
-    if missing := [f"pneumatic.{port}" for port in PORTS if scene[f"pneumatic.{port}"] == 0.0]:
+    ports = (f"pneumatic.{port}" for port in (*PORTS, "flushing"))
+    if missing := [port for port in ports if scene[port] == 0.0]:
         yield f"ports are missing ({', '.join(missing)} = 0 m^2): chambers live on leaks"
     falls = len(blows) > 0 and 0.0 < EVEN * most < float(blows["pneumatic_air"].mean())
+    if (back := scene["pneumatic.back_pressure"]) >= set_to > 0.0:
+        yield (
+            f"pneumatic.back_pressure = {in_digits(back / 1e5)} bar is no less than the supply's "
+            f"{in_digits(set_to / 1e5)} bar (pneumatic.supply_pressure): nothing drives the piston"
+        )
     if most > 0.0 == volume:
         yield (
             "pneumatic.supply_flow has no effect with pneumatic.supply_volume = 0 m^3, which never "
@@ -240,6 +246,13 @@ def _about_oil(result: Result) -> Iterator[str]:
             f"{in_digits(set_to / 1e5)} bar must be {in_digits(least / 1e5)} bar at least"
             * (set_to < least)
         )
+
+
+def _has_jammed(result: Result) -> bool:
+    """Whether the motor of the rotation has less torque than is needed at the end."""
+    scene, end = result.scene, result.end
+    stall = scene["rotation.stall_torque"]
+    return bool(end) and scene.motor_stalls and end["rotation_needed_torque"] > stall
 
 
 def _stands(result: Result) -> bool:

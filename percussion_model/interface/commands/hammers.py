@@ -64,8 +64,11 @@ def hammers(
     from rich.markup import escape
 
     from percussion_model.interface.tables import named_table, print_stored, print_table
+    from percussion_model.scene.hammers import CHAMBERS
     from percussion_model.scene.hammers.library import stored_hammer, stored_hammers
 
+    if name in CHAMBERS:
+        raise common.refusal(f"{name} is a scene (percussion new): its hammer is {CHAMBERS[name]}")
     chosen = [stored_hammer(one) for one in (stored_hammers() if name is None else [name])]
     if not common.told_as_json(json_file, chosen, plain):
         if name is None:

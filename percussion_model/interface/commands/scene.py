@@ -108,11 +108,13 @@ def _by_rock(scene: Scene, is_wanted: bool, asked: str | None) -> RateInterval |
     if not (is_wanted and scene["effects.breaking"]):
         return None
     if not uncertain_numbers(scene)[1]:
-        if asked:
-            common.print_message(
-                "rock and bit leave the rate uncertain, by how much is not known: the scene has "
-                "other numbers than the rock"
-            )
+        why = (
+            "has other numbers than the rock" if asked else "names no rock of the library (--rock)"
+        )
+        common.print_message(
+            f"rock and bit leave the rate uncertain, by how much is not known: the scene {why}; "
+            "without a calibration on site the model is no better than a factor 2"
+        )
         return None
     text = "sampling the intervals of rock and bit"
     with progress(text) as report:

@@ -121,7 +121,10 @@ def at_altitude(scene: Scene, height: float) -> Scene:
     Pressures of the supply are above that of the surroundings, a compressor's flow is by mass.
     """
     if scene.effects.drive != "pneumatic":
-        raise SceneError('altitude: needs air in chambers, effects.drive = "pneumatic"')
+        raise SceneError(
+            "altitude: needs air in chambers, as by percussion new --pressure: effects.drive = "
+            '"pneumatic"'
+        )
     if not -1000.0 <= height <= HIGHEST:
         raise SceneError(f"altitude = {height:g} m: must be a number from -1000 to {HIGHEST:g} m")
     values = zip(("pressure", "temperature"), atmosphere(height), strict=True)
