@@ -125,7 +125,12 @@ def _draw_loop(ax: Axes, name: str, loop: tuple[np.ndarray, np.ndarray]) -> None
     volume, pressure = loop
     ax.plot(volume / LITRE, pressure / BAR, color=BLUE)
     ax.text(
-        0.97, 0.92, f"{indicated_work(*loop):.0f} J", ha="right", va="top", transform=ax.transAxes
+        0.97,
+        0.92,
+        f"net work {indicated_work(*loop):.0f} J",
+        ha="right",
+        va="top",
+        transform=ax.transAxes,
     )
     style.label(ax, "volume [l]", "pressure, absolute [bar]", f"{name.capitalize()} chamber")
 
