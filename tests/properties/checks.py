@@ -11,6 +11,7 @@ import numpy as np
 
 from percussion_model import Simulation
 from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
+from percussion_model.physics.rock import REST_VELOCITY
 from percussion_model.solvers.fem.records import Mesh
 from percussion_model.solvers.modal.advance import LONGEST
 from percussion_model.solvers.modal.records import STEP
@@ -210,7 +211,7 @@ def check_forces(seen: dict[str, np.ndarray], scene: Any) -> None:
         travel = max(1e-5, np.abs(seen["gap"]).max(), reach)
         inside = (seen["gap"] + give * force).min()
         assert inside >= -ROUNDING * travel - 1e-15, f"gap: {inside} m"
-    force = seen["bit_force"]
+    force = seen["bit_force"] + pull_at_rest(seen, scene)
     may_pull = scene.effects.standstill_tension == "paper"
     if not (may_pull and scene.matters("effects.standstill_tension")):
         lowest = force.min()
@@ -218,6 +219,17 @@ def check_forces(seen: dict[str, np.ndarray], scene: Any) -> None:
     if scene.effects.rock == "wall":
         into = (seen["bit_end_position"] - scene.start.rock_gap - give * force).max()
         assert into <= ROUNDING * max(1e-5, reach), f"in the wall: {into} m"
+
+
+def pull_at_rest(seen: dict[str, np.ndarray], scene: Any) -> np.ndarray:
+    """How much rock may pull a bit in loading that is slower than counts as moving [N].
+
+    Its mass on the spring of the rock swings by no more than that velocity tells.
+    """
+    loads = np.isin(seen["drilling_mode"], (Mode.DFC, Mode.FC))
+    rests = loads & (np.abs(seen["bit_end_velocity"]) <= REST_VELOCITY)
+    stiffness = scene.rock.loading_stiffness * scene.rock.buttons
+    return rests * REST_VELOCITY * math.sqrt(stiffness * scene.bit.mass)
 
 
 def check_hole(watch: Watch, seen: dict[str, np.ndarray]) -> None:
