@@ -385,9 +385,11 @@ def rock_steps(watch: Watch) -> int:
         springs, limit = [here["gamma"] * here["k_r"]], LOADING * par["most_bend"]
         if here["mode"] == Mode.BC:
             limit = par["most_bend"]
-        elif here["mode"] != Mode.SS:
+        elif here["mode"] != Mode.SS and par["power"] == 1:
             last = again._state.record[0]["line_stiffness"]
             springs = [0.0, here["reload_stiffness"], last]
+        elif here["mode"] != Mode.SS:
+            springs = [here["k_r"]]
         worst = max(abs(spring - tables.forms.stiff[here["form"]]) for spring in springs)
         yields = tables.forms.yields[here["form"], 1 : STEP + 1].max(axis=1)
         level = np.count_nonzero(worst * yields <= limit)
@@ -415,7 +417,7 @@ def check_effort(counts: dict[str, int], watch: Watch) -> None:
     pieces = 0
     if case.scene.solver_name == "modal":
         pieces = PIECES * (counts["events"] + changes) + AHEAD * (changes + 1)
-        if steps > most + pieces and case.scene.effects.rock == "power":
+        if steps > most + pieces:
             most += rock_steps(watch)
     assert steps <= most + pieces, f"{steps} steps, at most {most + pieces:.0f} are needed"
     assert counts["events"] <= EVENTS_A_STEP * (most + 1), "storm of events"

@@ -22,6 +22,7 @@ from percussion_model.physics.loads import (
 )
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
+    REST_VELOCITY,
     Line,
     Place,
     book_crushed,
@@ -31,6 +32,7 @@ from percussion_model.physics.rock import (
     damping,
     is_crushable,
     is_curved,
+    is_loading,
     is_rigid_rock,
     line_between,
     origin,
@@ -189,7 +191,8 @@ def try_step(par, s, bars, level):
     force = spring + 0.5 * line.stiffness * path + C * path / h
     yields = bars.forms.yields[s.form, level, s.active // WIDTH - 1]
     # a constant force turns an end back that a stiff dashpot but stops: there the mean counts
-    speed = path / h if C * yields > h else ends.speed
+    stopped = C * yields > h and not follows_form(par, s)
+    speed = path / h if stopped else ends.speed
     first, last = spring + C * s.v_low, spring + line.stiffness * path + C * speed
     if is_rigid_rock(par):
         force = first = last = rest
@@ -319,6 +322,16 @@ def level_of_step(par, s, bars):
 
 
 @inlined
+def goes_back(s, path, h):
+    """Whether the rock end has turned within a step of `h`, by its way, though it may ring on."""
+    if s.time < s.rest_until:
+        return False
+    if is_loading(s):
+        return path < -REST_VELOCITY * h
+    return s.mode == Mode.BC and path > REST_VELOCITY * h
+
+
+@inlined
 def ends_of(s, trial):
     """The rock end before a step and after it."""
     after = End(s.p + trial.path, trial.speed, trial.last)
@@ -392,6 +405,8 @@ def go_on(par, s, bars, most, near, blows, events):
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
         if level > STEP:
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
+        elif level > 0 and not follows_form(par, s):
+            ends = ends or goes_back(s, trial.path, trial.h)
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
             level -= 1
