@@ -22,7 +22,6 @@ from percussion_model.physics.loads import (
 )
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import (
-    REST_VELOCITY,
     Line,
     Place,
     book_crushed,
@@ -32,7 +31,6 @@ from percussion_model.physics.rock import (
     damping,
     is_crushable,
     is_curved,
-    is_loading,
     is_rigid_rock,
     line_between,
     origin,
@@ -322,16 +320,6 @@ def level_of_step(par, s, bars):
 
 
 @inlined
-def goes_back(s, path, h):
-    """Whether the rock end has turned within a step of `h`, by its way, though it may ring on."""
-    if s.time < s.rest_until:
-        return False
-    if is_loading(s):
-        return path < -REST_VELOCITY * h
-    return s.mode == Mode.BC and path > REST_VELOCITY * h
-
-
-@inlined
 def ends_of(s, trial):
     """The rock end before a step and after it."""
     after = End(s.p + trial.path, trial.speed, trial.last)
@@ -405,8 +393,6 @@ def go_on(par, s, bars, most, near, blows, events):
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
         if level > STEP:
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
-        elif level > 0 and not follows_form(par, s):
-            ends = ends or goes_back(s, trial.path, trial.h)
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
             level -= 1
