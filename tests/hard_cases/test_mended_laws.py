@@ -150,7 +150,9 @@ SCENES = {
     "a dashpot that stops a thin end": (
         {
             "effects": {"drive": "none", "rock": "power"},
-            "bit": {"sections": [{"length": 0.2, "area": 5.5e-3}, {"length": 0.28, "area": 1.35e-5}]},
+            "bit": {
+                "sections": [{"length": 0.2, "area": 5.5e-3}, {"length": 0.28, "area": 1.35e-5}],
+            },
             "loss": {"time": 4.4e-8},
             "rock": {"barrier_damping": 9e6, "barrier_energy": 6e-5},
             "start": {"bit_velocity": -8.0},
