@@ -147,6 +147,29 @@ SCENES = {
         },
         3.7,
     ),
+    "a dashpot that stops a thin end": (
+        {
+            "effects": {"drive": "none", "rock": "power"},
+            "bit": {
+                "sections": [{"length": 0.2, "area": 5.5e-3}, {"length": 0.28, "area": 1.35e-5}],
+            },
+            "loss": {"time": 4.4e-8},
+            "rock": {"barrier_damping": 9e6, "barrier_energy": 6e-5},
+            "start": {"bit_velocity": -8.0},
+            "solver": {"cells": 5},
+        },
+        2e-3,
+    ),
+    "a step that is cut ends an ulp before the closure": (
+        {
+            "effects": {"drive": "none", "loss": False},
+            "piston": {"sections": [{"length": 2.18, "area": 5.5e-3}]},
+            "bit": {"sections": [{"length": 0.00713, "area": 2.36e-5}]},
+            "start": {"piston_velocity": 1.1e-10, "gap": 7.7e-10, "rock_gap": 2.25e-7},
+            "solver": {"name": "wave", "cells": 10},
+        },
+        2e-3,
+    ),
     "a reading past a step that the run cuts": (
         {
             "effects": {"drive": "none"},

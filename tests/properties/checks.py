@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from collections import Counter
 from typing import Any
@@ -10,9 +11,13 @@ import numpy as np
 
 from percussion_model import Simulation
 from percussion_model.physics.records import SAMPLE_FIELDS, EventKind, Mode
+from percussion_model.physics.rock import REST_VELOCITY
+from percussion_model.solvers.fem.records import Mesh
 from percussion_model.solvers.modal.advance import LONGEST
 from percussion_model.solvers.modal.records import STEP
+from percussion_model.solvers.modal.step import LOADING
 from percussion_model.solvers.wave.records import MOST_CUTS
+from tests.engine_views import Tables, mesh_of
 from tests.properties.scenes import Case
 from tests.state_bits import run_bits
 
@@ -129,7 +134,9 @@ class Watch:
         for name, value in ledger.items():
             if not name.endswith("_relative"):
                 assert np.isfinite(value), f"ledger: {name} = {value}"
-        scale = scale_of(ledger)
+        scale, (stiffness, way) = scale_of(ledger), rounded_places(self.simulation)
+        # the greatest force that this energy gives, on that way
+        scale = max(scale, math.sqrt(2.0 * stiffness * scale) * way / MOST_RESIDUAL)
         if scale > 0.0:
             residual = abs(ledger["residual"]) / scale
             assert residual < MOST_RESIDUAL, f"ledger: residual {residual:.3g}"
@@ -168,7 +175,7 @@ def check_case(case: Case) -> dict[str, Any]:
     check_blows(simulation.blows, scene)
     check_events(simulation.events, scene)
     counts = simulation.statistics()
-    check_effort(counts, simulation, case)
+    check_effort(counts, watch)
     found = Counter(Mode(int(mode)).name for mode in seen["drilling_mode"])
     blows, events = len(simulation.blows), len(simulation.events)
     watch.repeat()
@@ -204,7 +211,7 @@ def check_forces(seen: dict[str, np.ndarray], scene: Any) -> None:
         travel = max(1e-5, np.abs(seen["gap"]).max(), reach)
         inside = (seen["gap"] + give * force).min()
         assert inside >= -ROUNDING * travel - 1e-15, f"gap: {inside} m"
-    force = seen["bit_force"]
+    force = seen["bit_force"] + pull_at_rest(seen, scene)
     may_pull = scene.effects.standstill_tension == "paper"
     if not (may_pull and scene.matters("effects.standstill_tension")):
         lowest = force.min()
@@ -212,6 +219,17 @@ def check_forces(seen: dict[str, np.ndarray], scene: Any) -> None:
     if scene.effects.rock == "wall":
         into = (seen["bit_end_position"] - scene.start.rock_gap - give * force).max()
         assert into <= ROUNDING * max(1e-5, reach), f"in the wall: {into} m"
+
+
+def pull_at_rest(seen: dict[str, np.ndarray], scene: Any) -> np.ndarray:
+    """How much rock may pull a bit in loading that is slower than counts as moving [N].
+
+    Its mass on the spring of the rock swings by no more than that velocity tells.
+    """
+    loads = np.isin(seen["drilling_mode"], (Mode.DFC, Mode.FC))
+    rests = loads & (np.abs(seen["bit_end_velocity"]) <= REST_VELOCITY)
+    stiffness = scene.rock.loading_stiffness * scene.rock.buttons
+    return rests * REST_VELOCITY * math.sqrt(stiffness * scene.bit.mass)
 
 
 def check_hole(watch: Watch, seen: dict[str, np.ndarray]) -> None:
@@ -231,6 +249,22 @@ def check_hole(watch: Watch, seen: dict[str, np.ndarray]) -> None:
 def scale_of(ledger: dict[str, float]) -> float:
     """Energy that a run began with, and that forces gave or took [J]."""
     return ledger["initial"] + sum(abs(ledger[name]) for name in ("drive", "feed", "gravity"))
+
+
+def rounded_places(simulation: Simulation) -> tuple[float, float]:
+    """Stiffest spring at a node [N/m], and how far rounding takes it in all steps together [m].
+
+    Each node is a place that is rounded in each step; independent roundings add up by the root of
+    their number. They count where a bit moves by some 1e-10 of how far from the rock it is.
+    """
+    scene = simulation.scene
+    if scene.solver_name != "fem":
+        return 0.0, 0.0
+    mesh, seen = mesh_of(simulation.solver), simulation.observe()
+    place = abs(seen["penetration"]) + np.nan_to_num(seen["gap"])
+    count = mesh.shape[1] * (simulation.statistics()["steps"] + 1)
+    stiffness = max(scene.fem.contact_stiffness, mesh[Mesh.STIFFNESS].max())
+    return float(stiffness), float(np.sqrt(count) * np.spacing(place))
 
 
 def check_broken(watch: Watch) -> None:
@@ -278,17 +312,21 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
     m_b, m_p = (mass_of(watch.simulation, bar) for bar in ("bit", "piston"))
     # at a grid point one reads the first instant after it, or the point where inputs change
     late = (watch.simulation.solver.time_step or 0.0) * (1.0 if case.changes else SHORTEST)
+    stiffness, way = rounded_places(watch.simulation)
+    rounding = stiffness * way * (watch.simulation.solver.time_step or 0.0)
     # feed on the casing reaches the bit less the recoil of the last blow
     if "feed_force" not in case.changes and not has_casing(scene):
         push = feed + m_b * weight
         parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), -push * t, -contact, rock)
         parts += (drive - recoil,)
-        check_sum(parts, m_b * np.abs(seen["bit_velocity"]).max(), abs(push) * late, "bit")
+        scale = max(m_b * np.abs(seen["bit_velocity"]).max(), rounding / MOST_MOMENTUM)
+        check_sum(parts, scale, abs(push) * late, "bit")
     if scene.piston.model != "absent":
         push = m_p * weight
         parts = (m_p * (seen["piston_velocity"] - seen["piston_velocity"][0]), -push * t)
         parts += (contact, -drive)
-        check_sum(parts, m_p * np.abs(seen["piston_velocity"]).max(), abs(push) * late, "piston")
+        scale = max(m_p * np.abs(seen["piston_velocity"]).max(), rounding / MOST_MOMENTUM)
+        check_sum(parts, scale, abs(push) * late, "piston")
 
 
 def check_sum(parts: tuple[np.ndarray, ...], scale: float, slack: float, what: str) -> None:
@@ -331,8 +369,40 @@ def cuts_of(simulation: Simulation) -> int:
     return MOST_CUTS * int(closures + 1)
 
 
-def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> None:
+def rock_steps(watch: Watch) -> int:
+    """Most steps by which modes follow rock that is not the spring of their form.
+
+    Such a step is halved until it yields to the difference by less than a limit (docs/modal.md,
+    section 3), here the greatest between two events: on a curve at one of its ends.
+    """
+    simulation, again = watch.simulation, Simulation(watch.case.scene)
+    tables, par, given = Tables(again.solver), again.solver._par[0], dict(watch.given)
+    count, began = 0, 0.0
+    for ended in sorted({*simulation.events["time"], *given, watch.case.length}):
+        again.advance(0.5 * (began + ended))  # at an event a step may still be to come
+        here = again._state.record[0].copy()
+        again.advance(ended)
+        springs, limit = [here["gamma"] * here["k_r"]], LOADING * par["most_bend"]
+        if here["mode"] == Mode.BC:
+            limit = par["most_bend"]
+        elif here["mode"] != Mode.SS and par["power"] == 1:
+            last = again._state.record[0]["line_stiffness"]
+            springs = [0.0, here["reload_stiffness"], last]
+        elif here["mode"] != Mode.SS:
+            springs = [here["k_r"]]
+        worst = max(abs(spring - tables.forms.stiff[here["form"]]) for spring in springs)
+        yields = tables.forms.yields[here["form"], 1 : STEP + 1].max(axis=1)
+        level = np.count_nonzero(worst * yields <= limit)
+        count += int((ended - began) / (par["tick"] * (1 << level))) + 1
+        if ended in given:
+            again.set_inputs(**given[ended])
+        began = ended
+    return count
+
+
+def check_effort(counts: dict[str, int], watch: Watch) -> None:
     """Steps and events stay below their ceilings."""
+    simulation, case = watch.simulation, watch.case
     length = case.length
     if simulation.solver.time_step is None:
         bars = [bar for bar in (case.scene.piston, case.scene.bit) if bar.model != "absent"]
@@ -347,5 +417,7 @@ def check_effort(counts: dict[str, int], simulation: Simulation, case: Case) -> 
     pieces = 0
     if case.scene.solver_name == "modal":
         pieces = PIECES * (counts["events"] + changes) + AHEAD * (changes + 1)
+        if steps > most + pieces:
+            most += rock_steps(watch)
     assert steps <= most + pieces, f"{steps} steps, at most {most + pieces:.0f} are needed"
     assert counts["events"] <= EVENTS_A_STEP * (most + 1), "storm of events"

@@ -96,6 +96,7 @@ class TriedStep(NamedTuple):
 
     h: float  # [s]
     ends: Ends
+    speed: float  # of the rock end at the end [m/s]
     force: float  # mean force of the rock [N]
     first: float  # the same at the begin
     last: float  # and at the end
@@ -186,7 +187,11 @@ def try_step(par, s, bars, level):
     path = ends.low - s.low
     C, spring = damping(s), line.stiffness * (s.p - line.origin)
     force = spring + 0.5 * line.stiffness * path + C * path / h
-    first, last = spring + C * s.v_low, spring + line.stiffness * path + C * ends.speed
+    yields = bars.forms.yields[s.form, level, s.active // WIDTH - 1]
+    # a constant force turns an end back that a stiff dashpot but stops: there the mean counts
+    stopped = C * yields > h and not follows_form(par, s)
+    speed = path / h if stopped else ends.speed
+    first, last = spring + C * s.v_low, spring + line.stiffness * path + C * speed
     if is_rigid_rock(par):
         force = first = last = rest
     way_b = (ends.bit - s.at_b) / par.mass_b
@@ -200,7 +205,21 @@ def try_step(par, s, bars, level):
         way_p, low_p, gap = flight.way, flight.low, flight.gap
     work = C * path * path / h
     return TriedStep(
-        h, ends, force, first, last, path, work, rock, contact, touch, way_b, way_p, low_p, gap
+        h,
+        ends,
+        speed,
+        force,
+        first,
+        last,
+        path,
+        work,
+        rock,
+        contact,
+        touch,
+        way_b,
+        way_p,
+        low_p,
+        gap,
     )
 
 
@@ -247,7 +266,7 @@ def make(par, s, bars, level, trial, push, events):
         s.i_bit += trial.contact * h + par.mass_b * (h * s.a_b - (v_b - s.v_b))
     book_bit_load(par, s, trial.way_b)
     s.u_b += trial.way_b
-    s.v_b, s.v_low = v_b, ends.speed
+    s.v_b, s.v_low = v_b, trial.speed
     s.low, s.top, s.at_b, s.at_p = ends.low, ends.top, ends.bit, ends.piston
     s.f_contact, s.f_rock = trial.contact, trial.force
     s.p += trial.path
@@ -303,7 +322,7 @@ def level_of_step(par, s, bars):
 @inlined
 def ends_of(s, trial):
     """The rock end before a step and after it."""
-    after = End(s.p + trial.path, trial.ends.speed, trial.last)
+    after = End(s.p + trial.path, trial.speed, trial.last)
     return End(s.p, s.v_low, trial.first), after
 
 

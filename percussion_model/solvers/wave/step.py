@@ -233,7 +233,8 @@ def record_contact(par, s, waves, opened, t_close, approach, force, time, tau, b
     if opened == 1:
         open_gap(s, events, time, approach)
     if t_close >= 0.0:
-        closure = time + t_close
+        # no later than what the next step begins with, to the last bit: it may be an opening
+        closure = min(time + t_close, s.t_base - (par.dt - tau) + (s.step + 1) * par.dt)
         s.cuts = 0
         if starts_blow(par, s, closure):
             here = waves.bars[POSITION, par.bars - 1] + s.v_b * t_close
