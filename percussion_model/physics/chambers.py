@@ -144,9 +144,12 @@ def rates_of(par, air, around, y, bounds):
         by_upper = stiffness(from_upper, upper, behind)
         by_lower = stiffness(from_lower, lower, behind)
         vented = stiffness(out, behind, around) + stiffness(past, air, behind)
+        by_wall = (RATIO - 1.0) * wall / HEAT
+        wall_u = by_wall * upper.enthalpy * upper.per_pressure
+        wall_l = by_wall * lower.enthalpy * lower.per_pressure
         rate = max(
-            (stiffness(to_upper, air, upper) + by_upper + mixed) * per_u,
-            (stiffness(to_lower, air, lower) + by_lower + mixed) * per_l,
+            (stiffness(to_upper, air, upper) + by_upper + mixed + wall_u) * per_u,
+            (stiffness(to_lower, air, lower) + by_lower + mixed + wall_l) * per_l,
             (by_upper + by_lower + vented) * per_x,
             SWINGS * math.sqrt(max(spring, 0.0) / par.mass_p),
             SHRINKS * abs(v) * max(by_u, by_l),

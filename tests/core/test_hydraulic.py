@@ -9,19 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, Simulation, simulate
-from percussion_model.components.hydraulic import (
-    COMPONENT,
-    NOTHING,
-    PARTS,
-    SHARES,
-    Oil,
-    Pump,
-    filled,
-    go,
-    plus,
-    rates_of,
-    stopped,
-)
+from percussion_model.components.hydraulic import COMPONENT, NOTHING, filled
 from percussion_model.interface.cli import app
 from percussion_model.physics.chambers import Way, flight
 from percussion_model.physics.kernel import kernel
@@ -33,6 +21,16 @@ from percussion_model.physics.oil import (
     gas_pressure,
     orifice,
     pressure_of,
+)
+from percussion_model.physics.oil_chambers import (
+    PARTS,
+    SHARES,
+    Oil,
+    Pump,
+    go,
+    plus,
+    rates_of,
+    stopped,
 )
 from percussion_model.scene.hammers import with_chambers
 
@@ -350,6 +348,7 @@ HARD = {
     "a light spool": {"spool_mass": 1e-3},
     "foam": {"air": 0.3},
     "no air": {"air": 0.0},
+    "little gas, pressed to nearly nothing": {"gas_volume": 1e-5, "precharge": 1e5},
     "vapour of a solvent": {"vapour_pressure": 9e4},
     "no leak": {"leak": 0.0},
     "a large leak": {"leak": 1e-9},
