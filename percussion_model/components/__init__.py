@@ -1,6 +1,6 @@
 """Components that act on piston, bit and hole, one file each.
 
-Each module of this folder that defines `COMPONENT` is found by itself. A force acts on the
+Each module of this folder defines `COMPONENT` and is found by itself. A force acts on the
 body by mass, as weight and feed do. Parameters, switch in `[effects]`, inputs, state, the
 columns that show it and entries of the ledger follow from the same definition
 (CONTRIBUTING.md, "To add a component").
