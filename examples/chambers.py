@@ -124,14 +124,8 @@ def _told(
 def _draw_loop(ax: Axes, name: str, loop: tuple[np.ndarray, np.ndarray]) -> None:
     volume, pressure = loop
     ax.plot(volume / LITRE, pressure / BAR, color=BLUE)
-    ax.text(
-        0.97,
-        0.92,
-        f"net work {indicated_work(*loop):.0f} J",
-        ha="right",
-        va="top",
-        transform=ax.transAxes,
-    )
+    told = f"net work {indicated_work(*loop):.0f} J"
+    ax.text(0.97, 0.92, told, ha="right", va="top", transform=ax.transAxes)
     style.label(ax, "volume [l]", "pressure, absolute [bar]", f"{name.capitalize()} chamber")
 
 
