@@ -150,21 +150,26 @@ def held_way(x, v, a, d):
 
 
 @kernel
-def under_held_force(par, s, x, v, d):
+def under_held_force(par, s, x, v, d, others):
     """Oil over a step of a solver in which the piston would swing by more than `LONG`.
 
     The mean force is held on, and is that of the oil on the way which it makes: so the step is
     stable, however stiff the oil. By how much an acceleration is too great rises with it by one or
     more: that brackets the right one, which regula falsi (of Illinois) finds.
+
+    Parameters
+    ----------
+    others : float
+        Acceleration, down, that all else gives the piston [m/s^2].
     """
     now, pump, per = present_oil(s, x, v), pump_of(s), 1.0 / (par.mass_p * d)
     then = go(par, pump, now, held_way(x, v, 0.0, d))
-    one, off_one = 0.0, (then.impulse + s.hydraulic_owed) * per + par.gravity
+    one, off_one = 0.0, (then.impulse + s.hydraulic_owed) * per + others
     a, enough = -off_one, SETTLED * abs(off_one)
     other, off_other = a, 0.0
     for k in range(MOST_TRIES):
         then = go(par, pump, now, held_way(x, v, a, d))
-        off = a + (then.impulse + s.hydraulic_owed) * per + par.gravity
+        off = a + (then.impulse + s.hydraulic_owed) * per + others
         if abs(off) <= enough or off == off_one:
             break
         if k > 0 and off * off_other < 0.0:
@@ -180,15 +185,18 @@ def under_held_force(par, s, x, v, d):
 def foretell(par, s, span):
     """Foretell the oil, and the force that it will have."""
     x, v, d = -s.u_r, s.hydraulic_casing_velocity - s.v_p, span
+    others = par.gravity
+    if s.closed == 1 and s.hydraulic_touched == 1.0:  # and what the bit has given of late
+        others = s.hydraulic_pull - s.hydraulic_base / par.mass_p
     s.hydraulic_from_x, s.hydraulic_from_v = x, s.v_p
     s.hydraulic_touched = s.closed
     s.hydraulic_from_path = s.hydraulic_last_path = s.path_p
     # a piston that touches the bit goes on as it has gone
     bend = -s.hydraulic_pull if s.closed == 1 else 0.0
     way = Way(s.closed == 1, x, v, x + d * (v + 0.5 * bend * d), v + bend * d, d)
-    is_long = s.closed == 0 and s.hydraulic_swings * d * d > LONG * LONG
+    is_long = s.hydraulic_swings * d * d > LONG * LONG
     if is_long:
-        then = under_held_force(par, s, x, v, d)
+        then = under_held_force(par, s, x, v, d, others)
     else:
         then = go(par, pump_of(s), present_oil(s, x, v), way)
     s.hydraulic_span, s.hydraulic_since = span, 0.0

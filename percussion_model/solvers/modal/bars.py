@@ -341,7 +341,8 @@ def settle(par, s, bars, low):
     """Complete a new form: few modes, and the rock end where it was (offset `low`)."""
     refresh_loads(s, bars, s.a_b, s.a_p)
     refresh_sums(s, bars)
-    hold_end(s, bars, low)
+    # of rock that is stepped the last shape, out of place, would turn the end back at once
+    hold_end(s, bars, low if follows_form(par, s) else s.low)
     if bars.laws.sizes[2 * s.form] == 0 or not follows_form(par, s):
         trim(par, s, bars)
     refresh_sums(s, bars)
@@ -407,17 +408,16 @@ def change_spring(par, s, bars):
     """Go to the form that the present mode wants, with the penetration that it has."""
     form, low = form_wanted(par, s), s.p - origin(s)
     before, tip = bar_energy(s, bars), tip_of(par, s)
-    if form == s.form:
-        if low != s.low:
-            shift(s, bars, low - s.low)
-            refresh_sums(s, bars)
-        return
-    n = bars.forms.sizes[form]
-    uniform = low - s.low
-    pass_on(bars.forms.change[s.form, form % JOINED], bars.w, bars.rows, s.active, n)
-    take_form(s, bars, form, n)
-    shift(s, bars, uniform)
-    settle(par, s, bars, low)
+    if form != s.form:
+        n = bars.forms.sizes[form]
+        uniform = low - s.low
+        pass_on(bars.forms.change[s.form, form % JOINED], bars.w, bars.rows, s.active, n)
+        take_form(s, bars, form, n)
+        shift(s, bars, uniform)
+        settle(par, s, bars, low)
+    elif low != s.low:
+        shift(s, bars, low - s.low)
+        refresh_sums(s, bars)
     s.e_loss += before - bar_energy(s, bars)
     s.offset += tip - tip_of(par, s)
 

@@ -305,13 +305,13 @@ def level_of_step(par, s, bars):
 
     Steps on rock go with the modes asked for, so that runs with fewer tell what they do to a rate.
     """
-    if par.effects == 1 or is_rigid_rock(par) or follows_form(par, s):
+    if is_rigid_rock(par) or follows_form(par, s):
         return STEP
     # the rock changes slower than a front passes, slowest where it unloads
     level, most = par.asked + 1, LOADING * par.most_bend
     if s.mode == Mode.BC:
         level, most = par.asked + 2, par.most_bend
-    if s.closed == 1:
+    if s.closed == 1 or par.effects == 1:
         level = STEP
     K = s.line_stiffness if is_curved(par, s) else stiffness(s)
     while level > 0 and bend(s, bars, level, K) > most:
@@ -391,7 +391,7 @@ def go_on(par, s, bars, most, near, blows, events):
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
         before, now = ends_of(s, trial)
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
-        if level > STEP:
+        if level > STEP or (level > 0 and is_curved(par, s)):
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
