@@ -181,6 +181,54 @@ SCENES = {
         9.3e-5,
         (0.656, "sample", [0.656, 0.871, 0.913]),
     ),
+    "a light piston swings on oil while it touches": (
+        {
+            "effects": {"drive": "hydraulic", "barrier": False},
+            "piston": {
+                "sections": [
+                    {"length": 0.175, "area": 1.8e-5, "youngs_modulus": 1e9, "density": 4700.0},
+                ],
+            },
+            "hydraulic": {"rear_volume": 6.4e-5},
+            "solver": {"name": "wave", "cells": 4},
+        },
+        0.1,
+    ),
+    "the last shape, out of place, turns the end back at once": (
+        {
+            "effects": {"drive": "none", "cuttings": True},
+            "rock": {
+                "unloading_ratio": 1000.0, "removed_share": 0.5, "chipping_penetration": 1e-5,
+                "barrier_energy": 1e-10,
+            },
+            "solver": {"name": "modal", "cells": 3},
+        },
+        0.08,
+    ),
+    "an end goes back within a step": (
+        {
+            "effects": {"drive": "pneumatic", "rock": "power", "barrier": False},
+            "piston": {"model": "rigid"},
+            "bit": {"sections": [{"length": 0.2, "area": 5.5e-3, "density": 815.0}]},
+            "loss": {"time": 8.7e-9},
+            "rock": {"unloading_exponent": 5.0, "reference_penetration": 5.8e-4, "buttons": 783},
+            "solver": {"name": "modal", "cells": 3},
+        },
+        1.5e-3,
+        (0.05, "sample", [0.05 + 0.01 * step for step in range(96)]),
+    ),
+    "unloading far from where loading began": (
+        {
+            "effects": {"rock": "power"},
+            "feed": {"force": 0.0},
+            "rock": {
+                "loading_stiffness": 1.2e4, "loading_exponent": 2.0, "reference_penetration": 0.5,
+                "buttons": 2,
+            },
+            "solver": {"name": "modal"},
+        },
+        0.1,
+    ),
 }  # fmt: skip
 
 

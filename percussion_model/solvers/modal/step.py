@@ -391,8 +391,10 @@ def go_on(par, s, bars, most, near, blows, events):
         bursts = stands and overcomes_barrier(par, s, bit_kinetic(s, bars, bars.rows))
         before, now = ends_of(s, trial)
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
-        if level > STEP or (level > 0 and is_curved(par, s)):
+        if level > STEP:
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
+        elif level > 0 and is_curved(par, s):  # it goes on at both ends, yet has gone back
+            ends = ends or trial.path < 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
             level -= 1
