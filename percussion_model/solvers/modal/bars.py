@@ -407,17 +407,19 @@ def take_form(s, bars, form, n):
 def change_spring(par, s, bars):
     """Go to the form that the present mode wants, with the penetration that it has."""
     form, low = form_wanted(par, s), s.p - origin(s)
+    if form == s.form and low == s.low:
+        return
     before, tip = bar_energy(s, bars), tip_of(par, s)
-    if form != s.form:
+    if form == s.form:
+        shift(s, bars, low - s.low)
+        refresh_sums(s, bars)
+    else:
         n = bars.forms.sizes[form]
         uniform = low - s.low
         pass_on(bars.forms.change[s.form, form % JOINED], bars.w, bars.rows, s.active, n)
         take_form(s, bars, form, n)
         shift(s, bars, uniform)
         settle(par, s, bars, low)
-    elif low != s.low:
-        shift(s, bars, low - s.low)
-        refresh_sums(s, bars)
     s.e_loss += before - bar_energy(s, bars)
     s.offset += tip - tip_of(par, s)
 

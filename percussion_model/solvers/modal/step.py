@@ -393,7 +393,8 @@ def go_on(par, s, bars, most, near, blows, events):
         ends = passed(par, s, now.p, now.speed, trial.work, trial.last)
         if level > STEP:
             ends = ends or turns_between(s, before, now, trial.h) > 0.0
-        elif level > 0 and is_curved(par, s):  # it goes on at both ends, yet has gone back
+        elif level > 0 and is_curved(par, s) and s.time >= s.rest_until:
+            # it goes on at both ends, yet has gone back
             ends = ends or trial.path < 0.0
         turns = piston and switches(par, s, s.u_r + trial.way_p - trial.way_b)
         if level > 0 and (flip or ends or turns or bursts):
