@@ -341,8 +341,10 @@ def settle(par, s, bars, low):
     """Complete a new form: few modes, and the rock end where it was (offset `low`)."""
     refresh_loads(s, bars, s.a_b, s.a_p)
     refresh_sums(s, bars)
-    # of rock that is stepped the last shape, out of place, would turn the end back at once
-    hold_end(s, bars, low if follows_form(par, s) else s.low)
+    # where a curve loads, the last shape, out of place, would turn the end back at once; rock of
+    # another stiffness pushes harder than the form can hold without it
+    keeps = not is_curved(par, s) or s.k_r != par.k_r
+    hold_end(s, bars, low if keeps else s.low)
     if bars.laws.sizes[2 * s.form] == 0 or not follows_form(par, s):
         trim(par, s, bars)
     refresh_sums(s, bars)
