@@ -20,13 +20,13 @@ from unittest.mock import patch
 
 import llvmlite.binding as llvm
 from numba import njit, types
-from numba.core.caching import FunctionCache
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.cpu import CPUContext
 
 from percussion_model.engine.entries import ENTRIES, SOLVERS
 from percussion_model.engine.orphans import end_with_parent
 from percussion_model.engine.platforms import PLATFORMS
+from percussion_model.physics.compiling import add_callees_first, module_of
 
 _KINDS = {"w": types.int64, "n": types.float64}
 # What an entry returns where memory ends: Fault.MEMORY.
@@ -122,10 +122,9 @@ declare i32 @"{called}"(ptr, ptr, {", ".join(map(_ir_type, one.arguments))})
 
 @contextmanager
 def _each_by_itself() -> Iterator[None]:
-    """Let numba translate functions, and leave it at that.
+    """Let numba translate functions of its own and entries too, and leave it at that.
 
-    It would link each with all that it calls, optimise the whole and make machine code of it,
-    again for each caller: here this is done once, for all entries together.
+    All are optimised together, and nothing but C calls them: by wrappers that we write.
     """
 
     def mark(library: Any) -> None:
@@ -134,25 +133,16 @@ def _each_by_itself() -> Iterator[None]:
     def call_nothing(*_: Any) -> Callable[..., Any]:
         return [].append  # some built-in function, another each time: numba tells them apart by it
 
-    def keep_nothing(*_: Any) -> None:
+    def make_nothing(*_: Any, **__: Any) -> None:
         pass
 
     with (
         patch.object(CPUCodeLibrary, "finalize", mark),
         patch.object(CPUContext, "get_executable", call_nothing),
-        patch.object(FunctionCache, "load_overload", keep_nothing),
-        patch.object(FunctionCache, "save_overload", keep_nothing),
+        patch.object(CPUContext, "create_cpython_wrapper", make_nothing),
+        patch.object(CPUContext, "create_cfunc_wrapper", make_nothing),
     ):
         yield
-
-
-def _add_callees_first(library: Any, found: dict[int, Any]) -> None:
-    """Add those that a library calls to those found, and then itself."""
-    if id(library) in found:
-        return
-    for one in library._linking_libraries:
-        _add_callees_first(one, found)
-    found[id(library)] = library
 
 
 def compile_entries(entries: Mapping[str, Exported]) -> str:
@@ -168,13 +158,13 @@ def compile_entries(entries: Mapping[str, Exported]) -> str:
             fresh = njit(one.result(*one.arguments), error_model="numpy")(one.function.py_func)
             (compiled,) = fresh.overloads.values()
             wrappers.append(_wrapper(name, compiled.fndesc.llvm_func_name, one))
-            _add_callees_first(compiled.library, libraries)
+            add_callees_first(compiled.library, libraries)
         whole = llvm.parse_assembly("")
         for text in wrappers:
             whole.link_in(llvm.parse_assembly(text))
         # what nothing calls yet is left out: so what calls comes before what is called
         for library in reversed(libraries.values()):
-            whole.link_in(library._get_module_for_linking(), preserve=True)
+            whole.link_in(module_of(library), preserve=True)
     return _counting_plainly(_without_words(str(whole)))
 
 
