@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import sysconfig
 import urllib.request
 import zipfile
 from email import message_from_bytes
+from pathlib import Path
 
 import pytest
 
@@ -21,7 +23,8 @@ from fmu_src.hammer.build import build_hammer
 from fmu_src.native.library import PLATFORMS, stamp
 from fmu_src.wheels import make_wheel
 from percussion_model import Scene, simulate
-from percussion_model.engine.compiler import compiler_for
+from percussion_model.engine.compiler import compiler_for, kept_folder
+from percussion_model.engine.library import brought_file, make
 from percussion_model.engine.platforms import this_platform
 from percussion_model.scene.presets import scene_presets
 from tests.installed import build_wheel, expected_files, plain_environment, try_python
@@ -40,7 +43,10 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed(wheel, built_library, tmp_path_factory):
-    """The wheel in an environment of its own; the library of FMUs is kept there already."""
+    """The wheel in an environment of its own, which keeps the library of FMUs and a solver already.
+
+    `test_added_component` has an installation compile a solver.
+    """
     folder = tmp_path_factory.mktemp("installed")
     outer = {sysconfig.get_path(name) for name in ("purelib", "platlib")}
     made = plain_environment(folder, wheel, sorted(outer))
@@ -48,6 +54,11 @@ def installed(wheel, built_library, tmp_path_factory):
     kept.mkdir(parents=True)
     for name, content in built_library.items():
         (kept / f"{name}{PLATFORMS[name].suffix}").write_bytes(content)
+    if built_library:
+        make("rigid")
+        solver = Path("engine", "libraries", brought_file("rigid", this_platform()).name)
+        (folder / "percussion_cache" / solver.parent).mkdir(parents=True)
+        shutil.copy2(kept_folder().parent / solver, folder / "percussion_cache" / solver)
     made.variables["PATH"] = str(made.program("percussion").parent)  # without a compiler
     return made
 

@@ -1,7 +1,8 @@
 """Components that are one file each, in waves, modes, elements and rigid bodies.
 
-Added as CONTRIBUTING.md tells it, to a copy of the package. Waves, modes and elements run as
-plain Python, which spares a minute of compiling, but with PERCUSSION_LONG=1.
+Added as CONTRIBUTING.md tells it, to a copy of the package, which compiles as an installation
+does. Waves, modes and elements run as plain Python, which spares a minute of compiling, but with
+PERCUSSION_LONG=1.
 """
 
 from __future__ import annotations
@@ -200,6 +201,8 @@ def run(tmp_path_factory):
         command = [sys.executable, "-W", "ignore", "-c", RUN, solver, json.dumps(changes)]
         ran = subprocess.run(command, cwd=folder, env=kept, capture_output=True, text=True)
         assert ran.returncode == 0, ran.stderr
+        libraries = folder / "cache" / "engine" / "libraries"
+        assert len([*libraries.glob(f"{solver}-*")]) == (solver == "rigid" or LONG)
         found = json.loads(ran.stdout)
         for name, entries in found.items():
             assert abs(entries["residual_relative"]) < 1e-12, name
