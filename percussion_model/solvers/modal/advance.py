@@ -77,6 +77,7 @@ from percussion_model.solvers.modal.pairs import (
     leave_out_pairs,
     move_pairs,
     spell_out,
+    spell_speeds,
     take_pairs,
 )
 from percussion_model.solvers.modal.records import KEPT, STEP, Known, Task
@@ -84,6 +85,8 @@ from percussion_model.solvers.modal.step import level_of_step, step
 
 # Steps after which kinetic energy that still rises is high enough.
 LONGEST_RISE = 64
+# Ticks for which a bit at a standstill is looked at in one go.
+WATCHED = 32 * WHOLE
 # Most ticks of a leap.
 LONGEST = 65535 * WHOLE
 # In a longer one modes may die away altogether.
@@ -121,6 +124,13 @@ def quiet_time(par, s, v_b, a_b, spread_top, spread_mean):
     return time_to_cover(room, v, a), until_drive(par, s, v, a, spread_mean)
 
 
+@inlined
+def in_few_moves(ticks):
+    """Ticks, a sixteenth less or so, that are whole steps where they may be, and few moves."""
+    drop = max(level_below(ticks) - 4, STEP if ticks >= 4 * WHOLE else 0)
+    return ticks >> drop << drop
+
+
 @merged
 def hold_on(par, s):
     """Hold mean forces of components where that is over; ticks for which they hold from now on."""
@@ -133,7 +143,7 @@ def hold_on(par, s):
             s.u_p += way
             s.u_r += way
             s.gap -= way
-        ticks = max(int(lasting(par, s) / par.tick), 1)
+        ticks = in_few_moves(max(int(lasting(par, s) / par.tick), 1))
         hold_components(par, s, ticks * par.tick)
         s.held_from, s.held_until = s.time, s.time + ticks
     return s.held_until - s.time
@@ -201,7 +211,7 @@ def ready(par, s, bars, law):
 @kernel
 def kinetic_at(s, bars, x, first):
     """Kinetic energy of a bit alone, by pairs in two rows of `x` [J]."""
-    return kinetic_of(bars.rows, spell_out(s, bars, x, first))
+    return kinetic_of(bars.rows, spell_speeds(s, bars, x, first))
 
 
 @kernel
@@ -232,28 +242,30 @@ def watch_barrier(par, s, bars, most, events):
     s.alert = 1 if energy > QUIET_SHARE * barrier_level(par, s) else 0
     if s.alert == 0:
         return most
-    most = min(most, WHOLE)
     now = kinetic_of(bars.rows, bars.laws.sizes[s.law])
     if ends_standstill(par, s, now):
         drop_pairs(par, s, bars)
         end_standstill(par, s, bars, events)
-        return most
+        return min(most, WHOLE)
     if not overcomes_barrier(par, s, energy):
-        return most
-    ticks, level, passes = 0, level_below(most), False
+        return min(most, WHOLE)
+    most = min(most, WATCHED)
+    ticks, level, passes = 0, min(level_below(most), STEP), False
     keep(bars.w, PQ, bars.w, AT, s.pairs)
     while level >= 0:
         go = 1 << level
         if ticks + go <= most:
             keep(bars.w, AT, bars.rows, KEPT, s.pairs)
             move_pairs(s, bars, bars.w, AT, level)
-            if overcomes_barrier(par, s, kinetic_at(s, bars, bars.w, AT)):
+            if ends_standstill(par, s, kinetic_at(s, bars, bars.w, AT)):
                 most, passes = ticks + go, True
                 keep(bars.rows, KEPT, bars.w, AT, s.pairs)
             else:
                 ticks += go
                 if ticks == most:
                     break
+                if level == STEP:
+                    continue
         level -= 1
     if passes:
         keep_margin(par, s, highest_kinetic(s, bars))

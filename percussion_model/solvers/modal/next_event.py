@@ -284,24 +284,29 @@ def most_swing(s, bars, law):
     return most
 
 
+class Quiet(NamedTuple):
+    """Time in which nothing can happen."""
+
+    ticks: int  # 0 where looks are better
+    swing: float  # `most_swing` of a standstill [N]
+
+
 @kernel
 def quiet_standstill(par, s, bars, law, energy, most):
-    """Ticks in which a standstill goes on by itself, up to `most`; 0 where it is not quiet."""
+    """Make out how long a standstill goes on by itself, up to `most` ticks; `Quiet`."""
     if s.alert == 1 or not is_crushable(par) or barrier_off(par, s):
-        return 0
-    if par.release == 0:
-        return most
-    rest = par.mass_b * bit_acceleration(par, s)
-    if 2.0 * energy * law.stiffness >= (UNLIKELY * rest) ** 2:
-        return 0
+        return Quiet(0, 0.0)
+    rest, free = par.mass_b * bit_acceleration(par, s), par.release == 1
+    if free and 2.0 * energy * law.stiffness >= (UNLIKELY * rest) ** 2:
+        return Quiet(0, 0.0)
     swing = most_swing(s, bars, law)
-    if swing >= (1.0 - LEFT_OUT) * rest:
-        return 0
-    return most if swing < CALM * rest else min(most, LONGEST_LEAP)
+    if free and swing >= (1.0 - LEFT_OUT) * rest:
+        return Quiet(0, 0.0)
+    return Quiet(most if not free or swing < CALM * rest else min(most, LONGEST_LEAP), swing)
 
 
 @kernel
-def quiet_peaks(par, s, bars, law, ticks):
+def quiet_peaks(par, s, bars, law, ticks, swing):
     """Greatest forces of a quiet standstill; as `Found` has them, and whether they are known.
 
     They are not sought where no force can be the greatest of the blow, but for those of an
@@ -310,7 +315,7 @@ def quiet_peaks(par, s, bars, law, ticks):
     rest, K = par.mass_b * bit_acceleration(par, s), stiffness(s)
     begin, peak, late, done = time_of(par, s), 0.0, 0.0, 0
     watched = begin + ticks * par.tick > s.peak_from
-    if rest + most_swing(s, bars, law) <= s.b_peak_bit:
+    if rest + swing <= s.b_peak_bit:
         if not watched:
             return peak, late, True
         if s.leap_known != Known.SOUGHT:
@@ -489,14 +494,16 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
 
 
 @merged
-def quiet_ticks(par, s, bars, law, energy, most):
-    """Ticks in which nothing can happen, up to `most`; 0 where looks are better."""
+def quiet_ahead(par, s, bars, law, energy, most):
+    """Make out for how long nothing can happen, up to `most` ticks; `Quiet`."""
     if par.leaps == 0:
-        return 0
+        return Quiet(0, 0.0)
     if s.mode == Mode.FF:
         ticks = min(quiet_flight(par, s, bars, energy) / par.tick - WHOLE, most)
-        return int(ticks) if ticks >= FEWEST else 0
-    return quiet_standstill(par, s, bars, law, energy, most) if s.mode == Mode.SS else 0
+        return Quiet(int(ticks) if ticks >= FEWEST else 0, 0.0)
+    if s.mode == Mode.SS:
+        return quiet_standstill(par, s, bars, law, energy, most)
+    return Quiet(0, 0.0)
 
 
 @kernel
@@ -519,15 +526,17 @@ def search(par, s, bars, most, beside):
         if stale:  # what moved before is a bound of what does
             now = moving(s, bars, bars.w, AT)
         stale = not stale
-        quiet = 0 if beside.near else quiet_ticks(par, s, bars, law, now.energy, rest)
-        if quiet > 0 and stands and ticks > 0:
+        quiet = Quiet(0, 0.0)
+        if not beside.near:
+            quiet = quiet_ahead(par, s, bars, law, now.energy, rest)
+        if quiet.ticks > 0 and stands and ticks > 0:
             break  # its mean force is noted where it begins
-        if quiet > 0:
+        if quiet.ticks > 0:
             if stands:
-                peak, late, known = quiet_peaks(par, s, bars, law, quiet)
+                peak, late, known = quiet_peaks(par, s, bars, law, quiet.ticks, quiet.swing)
                 keep(bars.w, PQ, bars.w, AT, s.pairs)
-            carry_pairs(s, bars, bars.w, AT, quiet)
-            ticks += quiet
+            carry_pairs(s, bars, bars.w, AT, quiet.ticks)
+            ticks += quiet.ticks
             leaps += 1
             continue
         level = min(now.level, STEP + 2) if beside.near else now.level

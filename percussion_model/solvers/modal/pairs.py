@@ -357,6 +357,20 @@ def spell_out(s, bars, x, first):
 
 
 @kernel
+def spell_speeds(s, bars, x, first):
+    """Spell out only the velocities, as `spell_out` does; how many."""
+    if s.form % JOINED == 0:
+        for k in range(0, s.pairs, WIDTH):
+            store(bars.rows, 1, k, load(x, first + 1, k))
+        return s.pairs
+    n, table = bars.laws.sizes[s.law], bars.laws.out[s.law]
+    for i in range(0, n, WIDTH):
+        _, v = times_table(table, x, first, s.pairs, i)
+        store(bars.rows, 1, i, v)
+    return n
+
+
+@kernel
 def energy_about_rest(s, bars, n):
     """Energy of the modes in `bars.rows`, a rigid one apart [J]."""
     shape, energy = bars.forms.shape[s.form], spread(0.0)
