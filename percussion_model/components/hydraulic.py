@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from percussion_model.components import Component
-from percussion_model.physics.chambers import Way, is_past, straight_slope
+from percussion_model.physics.chambers import Way, is_past, moment_of, straight_slope
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 from percussion_model.physics.oil import REFERENCE, filling_of
 from percussion_model.physics.oil_chambers import (
@@ -121,7 +121,7 @@ def settle(par, s):
     h, x, before, v_p = s.hydraulic_since, -s.u_r, s.hydraulic_from_x, s.hydraulic_last_v
     casing = (x - before + s.path_p - s.hydraulic_from_path) / h
     then, off = foretold(s), 0.0
-    way = Way(True, before, casing - s.hydraulic_from_v, x, casing - v_p, h)
+    way = Way(True, before, casing - s.hydraulic_from_v, x, casing - v_p, h, 0.0)
     if abs(h - s.hydraulic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
         off = x - then.x
         then = on_way(way, then, h, then.rear, then.supply)
@@ -146,7 +146,7 @@ def settle(par, s):
 @inlined
 def held_way(x, v, a, d):
     """Way of a piston that a force held on for `d` [s] accelerates by `a` [m/s^2]."""
-    return Way(True, x, v, x + d * (v + 0.5 * a * d), v + a * d, d)
+    return Way(True, x, v, x + d * (v + 0.5 * a * d), v + a * d, d, 0.0)
 
 
 @kernel
@@ -193,7 +193,7 @@ def foretell(par, s, span):
     s.hydraulic_from_path = s.hydraulic_last_path = s.path_p
     # a piston that touches the bit goes on as it has gone
     bend = -s.hydraulic_pull if s.closed == 1 else 0.0
-    way = Way(s.closed == 1, x, v, x + d * (v + 0.5 * bend * d), v + bend * d, d)
+    way = Way(s.closed == 1, x, v, x + d * (v + 0.5 * bend * d), v + bend * d, d, 0.0)
     is_long = s.hydraulic_swings * d * d > LONG * LONG
     if is_long:
         then = under_held_force(par, s, x, v, d, others)
@@ -205,7 +205,8 @@ def foretell(par, s, span):
     # a force that goes straight with the impulse and the way of the one foretold
     slope = 0.0
     if s.closed == 0 and not is_long:
-        slope = straight_slope(par, then.impulse, then.x - x - d * v, d)
+        moment = moment_of(par, then.impulse, then.x - x - d * v, d)
+        slope = straight_slope(then.impulse, moment, d)
     s.hydraulic_slope = slope
     s.hydraulic_base = (then.impulse + s.hydraulic_owed) / d - 0.5 * slope * d
 

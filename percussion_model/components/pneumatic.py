@@ -23,6 +23,7 @@ from percussion_model.physics.chambers import (
     Way,
     go,
     is_past,
+    moment_of,
     size_of_lower,
     size_of_upper,
     started,
@@ -40,13 +41,15 @@ LEAST_PRESSURE = 100.0
 # A way foretold to this is the real one but for the work of the difference [m].
 NEAR = 1e-4
 # A bit that goes elsewhere than was foretold makes times shorter, by how far times the time [m s].
-OFF, AGAIN = 1e-8, 0.2
+OFF, AGAIN = 1.5e-8, 0.2
 # Steps of the bit's load, which make it ring, are below this share of the full pressure's.
-STEADY = 0.05
+STEADY = 0.07
 # Over less than this share of a step a velocity of the bit may be that of ringing alone.
 RINGS = 0.3
 # A bit that bounces comes to the piston no faster than this [m/s].
 BOUNCE = 5.0
+# `Mode.FF`, which follows from the components.
+FREE = 0
 
 
 @inlined
@@ -65,13 +68,15 @@ def present_gas(s):
 @inlined
 def note_pressures(par, s, share):
     """Note pressures at a share of the time foretold, in which energies go straight."""
-    x, rest, each = -s.u_r, 1.0 - share, RATIO - 1.0
+    x, rest, size_x = -s.u_r, 1.0 - share, par.pneumatic_exhaust_volume
+    size_u, size_l = size_of_upper(par, x), size_of_lower(par, x)
+    each = (RATIO - 1.0) / (size_u * size_l * size_x)
     energy_u = rest * s.pneumatic_energy_u + share * s.pneumatic_then_energy_u
     energy_l = rest * s.pneumatic_energy_l + share * s.pneumatic_then_energy_l
     energy_x = rest * s.pneumatic_energy_x + share * s.pneumatic_then_energy_x
-    s.pneumatic_upper_pressure = each * energy_u / size_of_upper(par, x)
-    s.pneumatic_lower_pressure = each * energy_l / size_of_lower(par, x)
-    s.pneumatic_exhaust_pressure = each * energy_x / par.pneumatic_exhaust_volume
+    s.pneumatic_upper_pressure = each * size_l * size_x * energy_u
+    s.pneumatic_lower_pressure = each * size_u * size_x * energy_l
+    s.pneumatic_exhaust_pressure = each * size_u * size_l * energy_x
 
 
 @inlined
@@ -122,11 +127,11 @@ def feed_supply(par, s, used, h):
 def corrected(par, s, then, before, x):
     """What was foretold, with the work that a way which is not quite as foretold makes of it."""
     gas, off = then.gas, x - then.x
-    p_u = (RATIO - 1.0) * gas.energy_u / size_of_upper(par, then.x)
-    p_l = (RATIO - 1.0) * gas.energy_l / size_of_lower(par, then.x)
+    per_u, per_l = 1.0 / size_of_upper(par, then.x), 1.0 / size_of_lower(par, then.x)
+    p_u, p_l = (RATIO - 1.0) * gas.energy_u * per_u, (RATIO - 1.0) * gas.energy_l * per_l
     # forces go straight on with the way, off by a part that grows in time
-    by_u = RATIO * p_u * par.pneumatic_upper_area**2 / size_of_upper(par, then.x) * off
-    by_l = RATIO * p_l * par.pneumatic_lower_area**2 / size_of_lower(par, then.x) * off
+    by_u = RATIO * p_u * par.pneumatic_upper_area**2 * per_u * off
+    by_l = RATIO * p_l * par.pneumatic_lower_area**2 * per_l * off
     up = (p_u * par.pneumatic_upper_area + 0.5 * by_u) * off
     down = (p_l * par.pneumatic_lower_area - 0.5 * by_l) * off
     given = down if then.x >= 0.0 and x >= 0.0 else 0.0
@@ -179,6 +184,32 @@ def summed(total, more):
     return new, more - (new - total)
 
 
+@inlined
+def turns_by(v):
+    """Time in which a bit that meets the rock at a velocity goes elsewhere by too much [s]."""
+    return math.sqrt(OFF / max(2.0 * abs(v), LEAST_DIVISOR))
+
+
+@inlined
+def note_bit(par, s, h, mean):
+    """Note how the bit has gone for a time, by which it is foretold: of mean velocity, if it rings.
+
+    One that flies falls evenly. One that has met the rock turns round, or not.
+    """
+    gained = s.v_b - s.pneumatic_from_b
+    gained_p = s.v_p - s.pneumatic_from_v
+    s.pneumatic_pull = (gained - gained_p) / h if s.pneumatic_touched == 1.0 else 0.0
+    share = min(h / (RINGS * par.pneumatic_step), 1.0)
+    s.pneumatic_bit_velocity += share * (mean - s.pneumatic_bit_velocity)
+    if s.pneumatic_flew == 0.0:
+        return
+    s.pneumatic_bit_velocity = s.v_b
+    if s.mode == FREE and s.closed == 0:
+        s.pneumatic_fall = gained / h
+    else:
+        s.pneumatic_reach = turns_by(s.pneumatic_from_b + s.pneumatic_fall * h)
+
+
 @kernel
 def settle(par, s):
     """Make out the gas on the way that was gone since it was foretold.
@@ -196,7 +227,7 @@ def settle(par, s):
     if abs(h - s.pneumatic_span) < 1e-9 * h and abs(x - then.x) < NEAR:
         then = corrected(par, s, then, before, x)
     else:
-        way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h)
+        way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h, 0.0)
         then = go(
             par, s.pneumatic_supply, outside(par, s), started(present_gas(s), before, 0.0), way
         )
@@ -220,25 +251,25 @@ def settle(par, s):
     )
     s.pneumatic_gas_work += done.work + bit * done.impulse
     s.pneumatic_held_work = s.pneumatic_given_work
-    share = min(h / (RINGS * par.pneumatic_step), 1.0)
-    s.pneumatic_bit_velocity += share * (bit - s.pneumatic_bit_velocity)
-    pressed = s.v_b - s.v_p - s.pneumatic_from_u
-    s.pneumatic_pull = pressed / h if s.pneumatic_touched == 1.0 else 0.0
+    note_bit(par, s, h, bit)
     s.pneumatic_span = s.pneumatic_since = 0.0
 
 
 @kernel
 def foretell(par, s, span):
     """Foretell the gas, and the forces that it will have."""
+    flies = s.closed == 0 and s.mode == FREE
+    fall, s.pneumatic_flew = 0.0, 0.0
+    if flies:
+        fall, s.pneumatic_flew, s.pneumatic_bit_velocity = s.pneumatic_fall, 1.0, s.v_b
     x, v, d = -s.u_r, s.pneumatic_bit_velocity - s.v_p, span
-    s.pneumatic_from_x, s.pneumatic_from_v = x, s.v_p
+    s.pneumatic_from_x, s.pneumatic_from_v, s.pneumatic_from_b = x, s.v_p, s.v_b
     s.pneumatic_touched = s.closed
     s.pneumatic_from_path = s.pneumatic_last_path = s.path_p
     y = started(present_gas(s), x, v)
     # a piston that touches the bit goes on as it has gone
     u, pull = s.v_b - s.v_p, s.pneumatic_pull if s.closed == 1 else 0.0
-    s.pneumatic_from_u = u
-    way = Way(s.closed == 1, x, u, x + d * (u + 0.5 * pull * d), u + pull * d, d)
+    way = Way(s.closed == 1, x, u, x + d * (u + 0.5 * pull * d), u + pull * d, d, fall)
     then = go(par, s.pneumatic_supply, outside(par, s), y, way)
     s.pneumatic_span, s.pneumatic_since = span, 0.0
     s.pneumatic_then_mass_u, s.pneumatic_then_energy_u = then.gas.mass_u, then.gas.energy_u
@@ -246,14 +277,17 @@ def foretell(par, s, span):
     s.pneumatic_then_mass_x, s.pneumatic_then_energy_x = then.gas.mass_x, then.gas.energy_x
     s.pneumatic_then_x, s.pneumatic_then_v = then.x, s.pneumatic_bit_velocity - then.v
     done = then.done
+    beyond = then.x - x - d * v - 0.5 * d * d * fall
+    moment = moment_of(par, done.impulse, beyond, d)
     s.pneumatic_then_used, s.pneumatic_then_vented = done.used, done.vented
     s.pneumatic_then_brought, s.pneumatic_then_expanded = done.brought, done.expanded
     s.pneumatic_then_impulse, s.pneumatic_then_on_bit = done.impulse, done.on_bit
-    s.pneumatic_then_work = done.work
+    # of a bit that goes by its mean velocity, as `settle` takes it
+    s.pneumatic_then_work = done.work + fall * (moment - 0.5 * d * done.impulse)
     # a force that goes straight with the impulse and the way of the one foretold
     impulse, slope = done.impulse, 0.0
     if s.closed == 0:
-        slope = straight_slope(par, impulse, then.x - x - d * v, d)
+        slope = straight_slope(impulse, moment, d)
     s.pneumatic_slope = slope
     s.pneumatic_base = (impulse + s.pneumatic_owed) / d - 0.5 * slope * d
     on_bit = (done.on_bit + s.pneumatic_owed_bit) / d
@@ -274,10 +308,19 @@ def lasts(par, s):
     """Time for which mean forces may be held [s]: up to where piston and bit may meet."""
     if not is_over(s):
         return s.pneumatic_span - s.pneumatic_since
+    if s.pneumatic_since > 0.0:
+        settle(par, s)  # which tells how long
     shortest, meet = SHORTEST * par.pneumatic_step, -s.u_r / max(s.v_p - s.v_b, BOUNCE)
     if s.closed == 1:
         return shortest
-    most = min(max(s.pneumatic_reach, AGAIN * par.pneumatic_step), LONGEST * par.pneumatic_step)
+    most = LONGEST * par.pneumatic_step
+    if s.mode == FREE:
+        room = s.p_u - s.p
+        speed = s.v_b + math.sqrt(max(s.v_b * s.v_b + 2.0 * s.pneumatic_fall * room, 0.0))
+        # or to where a bit that flies meets the rock
+        meet = min(meet, max(2.0 * room / max(speed, LEAST_DIVISOR), turns_by(speed - s.v_b)))
+    else:
+        most = min(max(s.pneumatic_reach, AGAIN * par.pneumatic_step), most)
     return min(max(meet, shortest), most)
 
 
@@ -407,9 +450,9 @@ COMPONENT = Component(
         *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         "then_x", "then_v", "then_used", "then_vented", "then_brought", "then_expanded",
         "then_impulse", "then_on_bit", "then_work",
-        "from_x", "from_v", "from_u", "from_path", "bit_velocity", "touched", "span", "since",
+        "from_x", "from_v", "from_b", "from_path", "bit_velocity", "touched", "span", "since",
         "base", "slope", "mean_on_bit", "load_change", "pull", "given", "given_bit", "given_work",
-        "owed", "owed_bit", "last_path", "last_v", "consumed_before", "reach",
+        "owed", "owed_bit", "last_path", "last_v", "consumed_before", "reach", "flew", "fall",
         "rest_used", "rest_vented", "rest_brought", "rest_expanded",
     ),
     pass_time=pass_time,

@@ -13,7 +13,7 @@ from percussion_model.physics.gas import HEAT, RATIO, flow, reservoir, stiffness
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
 # Rate of a volume times a step that is stable by the classical Runge-Kutta method (2.78).
-STABLE = 2.0
+STABLE = 2.4
 # Steps shorter than this share of the usual ones, which are far from being unstable, are as good
 # by two stages, at the start and in the middle.
 SHORT, GENTLE = 0.25, 0.06
@@ -215,17 +215,18 @@ class Way(NamedTuple):
     then_x: float
     then_v: float
     span: float  # [s]
+    fall: float  # acceleration of the bit that a flying piston's velocity is told by [m/s2]
 
 
 @inlined
 def flight(span):
     """Way of a piston that flies for a time."""
-    return Way(False, 0.0, 0.0, 0.0, 0.0, span)
+    return Way(False, 0.0, 0.0, 0.0, 0.0, span, 0.0)
 
 
 @inlined
-def straight_slope(par, impulse, beyond, d):
-    """Slope of a force that goes straight, by its impulse and the way that it makes [N/s].
+def moment_of(par, impulse, beyond, d):
+    """Moment of a force about the end of a time, by the way that it makes [N s2].
 
     Parameters
     ----------
@@ -236,7 +237,12 @@ def straight_slope(par, impulse, beyond, d):
     d : float
         Time of both [s].
     """
-    moment = d * impulse + par.mass_p * (beyond + 0.5 * d * d * par.gravity)
+    return d * impulse + par.mass_p * (beyond + 0.5 * d * d * par.gravity)
+
+
+@inlined
+def straight_slope(impulse, moment, d):
+    """Slope of a force that goes straight, by its impulse, and its moment about the end [N/s]."""
     return 12.0 * moment / (d * d * d) - 6.0 * impulse / (d * d)
 
 
@@ -264,7 +270,7 @@ def is_past(s, since, span, touched, from_v, then_v):
 def on_way(way, y, t):
     """The same gas with the piston where the way has it after a time."""
     if not way.known:
-        return y
+        return Ahead(y.gas, y.x, y.v + way.fall * t, y.done, y.rate)
     d, q = way.span, t / way.span
     bend = 3.0 * (way.then_x - way.x) - d * (2.0 * way.v + way.then_v)
     turn = 2.0 * (way.x - way.then_x) + d * (way.v + way.then_v)
@@ -313,10 +319,11 @@ def go(par, supply, hole, y, way):
     around = reservoir(hole, par.pneumatic_ambient_temperature)
     t, left = 0.0, way.span
     for _ in range(MOST_STEPS):
-        rate = rates_of(par, air, around, on_way(way, y, t), True)
+        now = on_way(way, y, t)  # the state of a flight is told by the bit's first velocity
+        rate = rates_of(par, air, around, now, True)
         steps = left * max(1.0 / par.pneumatic_step, rate.rate / STABLE)
         h = left / max(math.ceil(steps - 1e-9), 1)
-        bend = next_bend(par, y.x, y.v)
+        bend = next_bend(par, now.x, now.v)
         if LEAST_PART * h < bend < h:
             h = bend
         here = plus(y, rate, 0.5 * h)
@@ -330,7 +337,7 @@ def go(par, supply, hole, y, way):
                 end = plus(end, rate, SHARES[stage] * h)
                 here = plus(y, rate, PARTS[min(stage + 1, 3)] * h)
         t += h
-        y = on_way(way, end, t)
+        y = on_way(way, end, t) if way.known else end
         left -= h
         if left <= 1e-9 * way.span:
             break

@@ -130,7 +130,7 @@ def resting(par, x=0.0, line=150e5, rear=150e5, gas=None):
 
 def standing(span):
     """Way of a piston that does not move."""
-    return Way(True, 0.0, 0.0, 0.0, 0.0, span)
+    return Way(True, 0.0, 0.0, 0.0, 0.0, span, 0.0)
 
 
 def test_a_piston_on_a_closed_volume_of_oil_swings_as_a_mass_on_a_spring():
@@ -175,7 +175,7 @@ def test_oil_is_neither_lost_nor_won():
     par = hammer(leak=0.0, pilot_port=0.0)
     pump = Pump(1.0833e-3, 400e5)
     start = at_start(par, pump, 0.012)._replace(spool=5e-3)  # stuck where it opens to the line
-    end = gone(par, Pump(1.0833e-3, 500e5), start, Way(True, 0.012, -1.0, 0.004, -2.0, 5e-3))
+    end = gone(par, Pump(1.0833e-3, 500e5), start, Way(True, 0.012, -1.0, 0.004, -2.0, 5e-3, 0.0))
     kept = end.supply - start.supply + end.rear - start.rear - (end.gas - start.gas)
     assert end.used == pytest.approx(5e-3 * 1.0833e-3, 1e-12)
     assert kept == pytest.approx(end.used, 1e-9)
@@ -311,11 +311,14 @@ def drilling(solver, **changes):
 
 
 def test_independent_solvers_agree_on_a_hammer_with_oil():
-    found = {name: simulate(drilling(name), 1.2).blows[20:] for name in ("modal", "wave", "fem")}
+    # at the usual step velocities of impact are 1.5 % too low here, and 0.1 % those of hc25
+    finer = {"hydraulic.step": 7.5e-5}
+    names = ("modal", "wave", "fem")
+    found = {name: simulate(drilling(name, **finer), 1.2).blows[20:] for name in names}
     for name in ("wave", "fem"):
         for column in ("period", "impact_velocity", "hydraulic_oil", "hydraulic_pressure"):
             one, other = (found[which][column].mean() for which in ("modal", name))
-            assert other == pytest.approx(one, rel=0.015), (name, column)
+            assert other == pytest.approx(one, rel=0.01), (name, column)
 
 
 def test_a_saved_state_goes_on_to_the_same_bits():
