@@ -29,7 +29,8 @@ class Component(NamedTuple):
     parameters : mapping of tuple
         Default, unit, description, least and greatest value by name; kernels find the
         parameter X as `par.NAME_X`. A default of None has to be given where the component is
-        on; one that is true or false makes a flag, a least value of int a whole number.
+        on; one that is true or false makes a flag, a least value of int a whole number. One
+        named `step` is longer in runs that tell the error of this one.
     on_piston, on_bit : kernel or None
         on_...(par, s, h) -> mean force over the next time h in which the body moves on, down
         positive [N]. A mean that is off by h^2 makes a motion that is off by h^2. A force on

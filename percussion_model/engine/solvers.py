@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
+from percussion_model.components import COMPONENTS
 from percussion_model.engine.solver import EngineSolver
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
@@ -22,10 +24,21 @@ from percussion_model.solvers.state import State
 from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 from percussion_model.solvers.wave.resolution import comparable_steps
 
+# Steps of components in runs to compare with, by those of this one: errors of second order double.
+LONGER_STEPS = math.sqrt(2.0)
 # Elements and contact stiffness of runs to compare with, by those of this one.
 COARSER_ELEMENTS = 0.5
 # Of the directory of a motion by modes: how many each form has, that of the free bit first.
 SIZES_ROW = 0
+
+
+def longer_steps(scene: Scene) -> dict[str, float]:
+    """Steps of components that are on, longer, so that runs with them tell what steps cost.
+
+    A component has such a step as its parameter `step`.
+    """
+    keys = (f"{one.name}.step" for one in COMPONENTS if "step" in one.parameters)
+    return {key: LONGER_STEPS * scene[key] for key in keys if scene.matters(key)}
 
 
 class ModalSolver(EngineSolver):
@@ -50,7 +63,7 @@ class ModalSolver(EngineSolver):
 
     def coarser_scenes(self) -> list[Scene] | None:
         """The scene with fewer modes."""
-        changes = {"solver.accuracy": None, "run.check": False}
+        changes = {"solver.accuracy": None, "run.check": False, **longer_steps(self.scene)}
         counts = coarser_modes(self.modes, COARSER)
         return [
             self.scene.replace(**changes, **{"solver.cells": count}) for count in counts
@@ -80,7 +93,7 @@ class WaveSolver(EngineSolver):
 
     def coarser_scenes(self) -> list[Scene] | None:
         """The scene with steps half as long again, or about that where loss refuses these."""
-        changes = {"solver.accuracy": None, "run.check": False}
+        changes = {"solver.accuracy": None, "run.check": False, **longer_steps(self.scene)}
         scenes = [
             self.scene.replace(**changes, **{"solver.cells": count})
             for count in comparable_steps(next(iter(self.cells.values())))
@@ -120,6 +133,7 @@ class FemSolver(EngineSolver):
         if scene.fem.elements == 1:
             return None
         coarser: dict[str, Any] = {"fem.elements": int(COARSER_ELEMENTS * scene.fem.elements)}
+        coarser |= longer_steps(scene)
         if scene.matters("fem.damping_ratio") and scene.fem.damping_ratio is not None:
             coarser |= {"fem.damping_ratio": None, "loss.time": self.loss_time}
         scenes = [scene.replace(**coarser)]
@@ -140,8 +154,9 @@ class RigidSolver(EngineSolver):
         return []
 
     def coarser_scenes(self) -> list[Scene]:
-        """None: rigid bodies move in closed form."""
-        return []
+        """The scene with longer steps of components: rigid bodies move in closed form."""
+        longer = longer_steps(self.scene)
+        return [self.scene.replace(**longer)] if longer else []
 
     def advance(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool

@@ -273,8 +273,8 @@ def _by_modes(run: GridRun, others: Sequence[GridRun]) -> float:
 
 
 def _resolution(result: Result) -> int:
-    """Cells or modes of the first elastic bar."""
-    return next(iter(result.cells.values()))
+    """Cells or modes of the first elastic bar; 1 of rigid bodies."""
+    return next(iter(result.cells.values()), 1)
 
 
 def _difference(other: GridRun, run: GridRun) -> float:
@@ -527,7 +527,6 @@ def _comparison_time(result: Result, coarser: Sequence[Scene]) -> float:
 
 
 def _cells_asked(scene: Scene) -> int:
-    """Cells or elements that a scene names."""
+    """Cells or elements that a scene names; 1 of rigid bodies."""
     count = scene.fem.elements if scene.solver_name == "fem" else scene.solver.cells
-    assert count is not None
-    return count
+    return count or 1
