@@ -204,7 +204,9 @@ def note_bit(par, s, h, mean):
     if s.pneumatic_flew == 0.0:
         return
     s.pneumatic_bit_velocity = s.v_b
-    if s.mode == FREE and s.closed == 0:
+    if s.i_contact != s.pneumatic_from_contact:
+        return  # the piston has struck it
+    if s.mode == FREE:
         s.pneumatic_fall = gained / h
     else:
         s.pneumatic_reach = turns_by(s.pneumatic_from_b + s.pneumatic_fall * h)
@@ -264,7 +266,7 @@ def foretell(par, s, span):
         fall, s.pneumatic_flew, s.pneumatic_bit_velocity = s.pneumatic_fall, 1.0, s.v_b
     x, v, d = -s.u_r, s.pneumatic_bit_velocity - s.v_p, span
     s.pneumatic_from_x, s.pneumatic_from_v, s.pneumatic_from_b = x, s.v_p, s.v_b
-    s.pneumatic_touched = s.closed
+    s.pneumatic_touched, s.pneumatic_from_contact = s.closed, s.i_contact
     s.pneumatic_from_path = s.pneumatic_last_path = s.path_p
     y = started(present_gas(s), x, v)
     # a piston that touches the bit goes on as it has gone
@@ -450,9 +452,10 @@ COMPONENT = Component(
         *(f"then_{name}_{of}" for of in "ulx" for name in ("mass", "energy")),
         "then_x", "then_v", "then_used", "then_vented", "then_brought", "then_expanded",
         "then_impulse", "then_on_bit", "then_work",
-        "from_x", "from_v", "from_b", "from_path", "bit_velocity", "touched", "span", "since",
-        "base", "slope", "mean_on_bit", "load_change", "pull", "given", "given_bit", "given_work",
-        "owed", "owed_bit", "last_path", "last_v", "consumed_before", "reach", "flew", "fall",
+        "from_x", "from_v", "from_b", "from_path", "from_contact", "touched", "span", "since",
+        "bit_velocity", "base", "slope", "mean_on_bit", "load_change", "pull", "given", "given_bit",
+        "given_work", "owed", "owed_bit", "last_path", "last_v", "consumed_before", "reach",
+        "flew", "fall",
         "rest_used", "rest_vented", "rest_brought", "rest_expanded",
     ),
     pass_time=pass_time,

@@ -229,8 +229,13 @@ def highest_kinetic(s, bars):
 
 
 @kernel
-def watch_barrier(par, s, bars, most, events):
+def watch_barrier(par, s, bars, most, alone, events):
     """Leave standstill where the kinetic energy of the bit passes the barrier.
+
+    Parameters
+    ----------
+    alone : int
+        Ticks in which nothing can come from the piston.
 
     Returns
     -------
@@ -249,7 +254,10 @@ def watch_barrier(par, s, bars, most, events):
         return min(most, WHOLE)
     if not overcomes_barrier(par, s, energy):
         return min(most, WHOLE)
-    most = min(most, WATCHED)
+    stands = min(most, alone, WATCHED)
+    if stands > WHOLE:
+        stands = search(par, s, bars, stands, beside_of(par, s, bars, False)).ticks
+    most = min(most, max(stands, WHOLE))
     ticks, level, passes = 0, min(level_below(most), STEP), False
     keep(bars.w, PQ, bars.w, AT, s.pairs)
     while level >= 0:
@@ -333,12 +341,11 @@ def plan(par, s, bars, law, most, events):
         park(par, s, bars)
     most = min(most, hold_on(par, s))
     ready(par, s, bars, law)
+    most, far = at_rest(s, most), far_ticks(par, s, bars)
     if s.mode == Mode.SS and s.alert == 1 and is_crushable(par):
-        most = watch_barrier(par, s, bars, most, events)
+        most = watch_barrier(par, s, bars, most, min(far.meet, far.turn), events)
         if s.law < 0:
             return most
-    most = at_rest(s, most)
-    far = far_ticks(par, s, bars)
     ahead = min(most, far.turn)
     if far.meet >= FEWEST:
         ahead = min(ahead, far.meet)
