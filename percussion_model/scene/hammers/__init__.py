@@ -23,6 +23,8 @@ AIR = {
     "dth5": "sandvik-5-inch",
     "dth6": "sandvik-6-inch",
 }
+# The feed that holds a casing, by the recoil of the hammer in its own rock.
+HELD = 1.1
 CHAMBERS = {**AIR, "hc25": "montabert-hc-25", "t38": "cop-1838"}
 
 
@@ -66,6 +68,7 @@ def with_chambers(name: str, pressure: float, rods: int | None = None) -> Scene:
     """Return the scene of a hammer that air or oil drives, in chambers fitted to a catalogue.
 
     With `effects.drive = "pressure"` it has the pressure law that stands for them; oil, its own.
+    The feed is that of the hammer, or more where the recoil of air would lift it.
 
     Parameters
     ----------
@@ -89,23 +92,28 @@ def with_chambers(name: str, pressure: float, rods: int | None = None) -> Scene:
     drive = "pneumatic" if name in AIR else "hydraulic"
     numbers = read_toml(CHAMBER_FILES / f"{CHAMBERS[name]}.toml")[drive]
     changes = {f"{drive}.{key}": value for key, value in numbers.items()}
-    law = _law(name, pressure) if name in AIR else {}
+    law = _by_pressure(name, pressure, scene) if name in AIR else {}
     changes |= {"effects.drive": drive, f"{drive}.supply_pressure": pressure, **law}
     return scene.replace(**changes)
 
 
-def _law(name: str, pressure: float) -> dict[str, float]:
-    """Pressure law straight between those that are stored; beyond them F_0 goes with pressure."""
+def _by_pressure(name: str, pressure: float, scene: Scene) -> dict[str, float]:
+    """Pressure law and feed, straight between those stored; beyond, forces go with pressure."""
     from numpy import interp
 
     rows = read_toml(_HERE / "chambers" / "laws.toml")[name]
     known = min(max(pressure, rows["pressure"][0]), rows["pressure"][-1])
-    force, distance = (
-        float(interp(known, rows["pressure"], rows[key])) for key in ("force", "reversal_distance")
+    force, distance, recoil = (
+        float(interp(known, rows["pressure"], rows[key]))
+        for key in ("force", "reversal_distance", "recoil")
     )
+    beyond = max(pressure, 0.0) / known
+    weight = scene.feed.casing_mass * scene.gravity.acceleration
+    holds = HELD * recoil * beyond - weight
     return {
-        "drive.force": round(force * max(pressure, 0.0) / known, 1),
+        "drive.force": round(force * beyond, 1),
         "drive.reversal_distance": round(distance, 6),
+        "feed.force": max(scene.feed.force, round(holds, -2)),
     }
 
 
