@@ -17,7 +17,7 @@ from docs.blocks import DOCS, publish
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
 from percussion_model.scene.bits import bit, bit_of
-from percussion_model.scene.hammers import hammer, hammers
+from percussion_model.scene.hammers import hammer, hammers, with_chambers
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.simulation.markdown import table
@@ -32,6 +32,7 @@ FEEDS = {
 }
 # The ranges are for all pressures: the least goes with the lowest, as 12 bar by 20. Assumed.
 LOW = 0.6
+PRESSURE = 24e5  # of air [Pa]
 DURATION, SETTLE = 20.0, 1.0
 RPM = 2.0 * math.pi / 60.0
 SPEEDS = (0.5, 1, 2, 3, 5, 7, 10, 14, 20, 28, 40, 55, 75, 100)
@@ -101,28 +102,45 @@ def recoil_of(scene: Scene, told: dict[str, Any]) -> float:
     return float(told["mean_contact_force"]) - weight
 
 
+def plateau(name: str, scene: Scene, first: float) -> tuple[list[float], float]:
+    """Rates [m/h] by feeds from a first one [N] to where the motor loses speed; the last feed."""
+    feed, rates, last = first, [], first
+    told = with_motor(scene, feed, STALLS[name])
+    while told["rotation_torque"] <= FULL * STALLS[name]:
+        rates.append(3600.0 * told["rate_of_penetration"])
+        last, feed = feed, 1.15 * feed
+        told = with_motor(scene, feed, STALLS[name])
+    return rates, last
+
+
+def spread(rates: list[float]) -> str:
+    """Least and greatest rate by their mean."""
+    mean = float(np.mean(rates))
+    return f"{100.0 * (min(rates) / mean - 1.0):+.0f} / {100.0 * (max(rates) / mean - 1.0):+.0f}"
+
+
 def feed_rows() -> Iterator[list[str]]:
     """A row for each hammer down the hole and rock: rates from recoil to the motor, torques."""
     for name, (least, most) in FEEDS.items():
         for found in ROCKS:
-            scene = on_rock(found, hammer(name))
+            scene, air = on_rock(found, hammer(name)), on_rock(found, with_chambers(name, PRESSURE))
             weight = scene["feed.casing_mass"] * scene.gravity.acceleration
-            feed, rates = recoil_of(scene, summary_of(scene)) - weight, []
-            told = with_motor(scene, feed, STALLS[name])
-            first = feed
-            while told["rotation_torque"] <= 0.8 * STALLS[name]:
-                rates.append(3600.0 * told["rate_of_penetration"])
-                last, feed = feed, 1.15 * feed
-                told = with_motor(scene, feed, STALLS[name])
+            first = recoil_of(scene, summary_of(scene)) - weight
+            rates, last = plateau(name, scene, first)
             jammed = with_motor(scene, 6.0 * first, STALLS[name])["rate_of_penetration"] or 0.0
+            run = simulate(air, DURATION, SETTLE, error_estimate=False)
+            first_air = run.end["recoil_impulse"] / run.duration - weight
+            rates_air, last_air = plateau(name, air, first_air)
             yield [
                 name,
                 found,
                 f"{1e-3 * first:.1f} to {1e-3 * last:.1f}",
                 f"{np.mean(rates):.1f}",
-                f"{100.0 * (min(rates) / np.mean(rates) - 1.0):+.0f} / "
-                f"{100.0 * (max(rates) / np.mean(rates) - 1.0):+.0f}",
+                spread(rates),
                 f"{3600.0 * jammed:.1f}",
+                f"{1e-3 * first_air:.1f} to {1e-3 * last_air:.1f}",
+                f"{np.mean(rates_air):.1f}",
+                spread(rates_air),
                 torques([scene], least, most),
                 torques([scene.replace(**string(scene, one)) for one in LENGTHS], least, most),
             ]
@@ -151,7 +169,8 @@ def torques(scenes: list[Scene], least: float, most: float) -> str:
 
 FEED_HEADINGS = (
     "hammer", "rock", "feed, recoil to 0.8 of the motor, kN", "mean m/h", "least / most, %",
-    "m/h at six times the first",
+    "m/h at six times the first", "with chambers of air at 24 bar: feed, kN", "mean m/h",
+    "least / most, %",
     "torque, N m, at makers' least feed with 0.6 of the drive, with all of it, own, greatest feed",
     "the same with strings of 5 to 80 m that twist, mean",
 )  # fmt: skip
