@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Mode, Simulation, simulate
-from percussion_model.scene.hammers import hammer, hammers
+from percussion_model.scene.hammers import hammer, hammers, with_chambers
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.simulation.rate import rate_of_blows
@@ -28,6 +28,8 @@ LEAST_FEED = {"dth3": 4400.0, "dth4": 6500.0, "dth5": 8300.0, "dth6": 9700.0}
 MAKERS_FEED = ((0.6, 8300.0), (1.0, 11000.0), (1.0, 13500.0))
 # A motor for it: torque at which it stalls, and up to which it holds its speed [N m].
 STALL, FULL = 900.0, 600.0
+# The same for each of them, and the share of it up to which it holds its speed.
+STALLS, SHARE = {"dth3": 300.0, "dth4": 600.0, "dth5": STALL, "dth6": 1500.0}, 0.8
 
 
 @cache
@@ -164,6 +166,27 @@ def test_rate_hardly_depends_on_feed_from_recoil_to_what_the_motor_bears(kind):
     assert len(rates) > 5
     assert max(rates) < 1.05 * np.mean(rates)
     assert min(rates) > 0.95 * np.mean(rates)
+
+
+@pytest.mark.parametrize("kind", ROCKS)
+@pytest.mark.parametrize("name", LEAST_FEED)
+def test_rate_with_chambers_does_not_depend_on_feed(name, kind):
+    """By the pressure law hammers hop just above the recoil (docs/breaking.md)."""
+    air, stall = with_chambers(name, 24e5), STALLS[name]
+    motor = {"rotation.stall_torque": stall, "rotation.full_torque": SHARE * stall}
+    scene = air.replace(**parameters_under(rock(kind), air), **motor)
+    weight = scene["feed.casing_mass"] * scene.gravity.acceleration
+    drive = simulate(scene, 3.0, record_events=False, error_estimate=False)
+    feed, rates = drive.end["recoil_impulse"] / 3.0 - weight, []
+    while True:
+        fed = scene.replace(**{"feed.force": feed})
+        run = simulate(fed, 3.0, settle=1.0, record_events=False, error_estimate=False)
+        if run.counted["rotation_torque"].mean() > SHARE * stall:
+            break
+        rates.append(advance_of(run.counted))
+        feed *= 1.2
+    assert len(rates) > 2
+    assert max(rates) - min(rates) < 0.05 * np.mean(rates)
 
 
 def test_too_much_feed_jams_the_bit():
