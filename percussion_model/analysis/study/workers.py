@@ -20,6 +20,8 @@ from percussion_model.scene.inputs import SimulationError
 STARTED_AGAIN = 97
 # A pool whose workers die is made anew so often.
 MOST_RESTARTS = 3
+# A pool has found by then that its workers were ended [s].
+FOUND_GONE = 5.0
 # One thread a process: their matrices are small, and the processes fill the machine.
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -89,6 +91,8 @@ def _in_a_pool(
         if running:  # interrupted: what workers have begun is not waited for
             for worker in set(active_children()) - others:
                 worker.terminate()
+            # told to shut down before it finds them gone, a pool waits for ever for one to read on
+            wait(running, timeout=FOUND_GONE)
         pool.shutdown(wait=False, cancel_futures=True)
 
 
