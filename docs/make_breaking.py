@@ -33,6 +33,8 @@ FEEDS = {
 # The ranges are for all pressures: the least goes with the lowest, as 12 bar by 20. Assumed.
 LOW = 0.6
 PRESSURE = 24e5  # of air [Pa]
+# Of hammers of medium pressure, as that maker's are [Pa].
+MEDIUM = (10e5, 12.5e5, 15e5)
 DURATION, SETTLE = 20.0, 1.0
 RPM = 2.0 * math.pi / 60.0
 SPEEDS = (0.5, 1, 2, 3, 5, 7, 10, 14, 20, 28, 40, 55, 75, 100)
@@ -141,9 +143,19 @@ def feed_rows() -> Iterator[list[str]]:
                 f"{1e-3 * first_air:.1f} to {1e-3 * last_air:.1f}",
                 f"{np.mean(rates_air):.1f}",
                 spread(rates_air),
+                torques_on_air(name, found, (least, 0.5 * (least + most), most)),
                 torques([scene], least, most),
                 torques([scene.replace(**string(scene, one)) for one in LENGTHS], least, most),
             ]
+
+
+def torques_on_air(name: str, found: str, feeds: tuple[float, ...]) -> str:
+    """Torques with chambers, at feeds of makers and the pressures that these go with."""
+    told = []
+    for pressure, feed in zip(MEDIUM, feeds, strict=True):
+        scene = on_rock(found, with_chambers(name, pressure))
+        told.append(summary_of(scene, **{"feed.force": feed})["rotation_torque"])
+    return ", ".join(f"{one:.0f}" for one in told)
 
 
 def string(scene: Scene, length: float) -> dict[str, float]:
@@ -171,6 +183,7 @@ FEED_HEADINGS = (
     "hammer", "rock", "feed, recoil to 0.8 of the motor, kN", "mean m/h", "least / most, %",
     "m/h at six times the first", "with chambers of air at 24 bar: feed, kN", "mean m/h",
     "least / most, %",
+    "torque with chambers, N m, at makers' least feed and 10 bar, middle and 12.5, greatest and 15",
     "torque, N m, at makers' least feed with 0.6 of the drive, with all of it, own, greatest feed",
     "the same with strings of 5 to 80 m that twist, mean",
 )  # fmt: skip

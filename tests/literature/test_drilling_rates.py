@@ -26,6 +26,8 @@ LEAST_FEED = {"dth3": 4400.0, "dth4": 6500.0, "dth5": 8300.0, "dth6": 9700.0}
 # makers, that of the preset and the greatest (docs/data/hammer_sources.md). Makers give one range
 # for all pressures, so the least goes with a low one: 12 bar by 20.
 MAKERS_FEED = ((0.6, 8300.0), (1.0, 11000.0), (1.0, 13500.0))
+# The same range with chambers: it is of a hammer of medium pressure, 10 to 15 bar.
+MEDIUM = ((10e5, 8300.0), (12.5e5, 11000.0), (15e5, 13500.0))
 # A motor for it: torque at which it stalls, and up to which it holds its speed [N m].
 STALL, FULL = 900.0, 600.0
 # The same for each of them, and the share of it up to which it holds its speed.
@@ -215,3 +217,12 @@ def test_torque_at_makers_feed(share, feed, kind):
     drive = share * scene_in("dth5", kind).drive.force
     torque = blows_of("dth5", kind, 3.0, (("drive.force", drive), ("feed.force", feed)))
     assert 150.0 < torque["rotation_torque"].mean() < 900.0
+
+
+@pytest.mark.parametrize("kind", ROCKS)
+@pytest.mark.parametrize(("pressure", "feed"), MEDIUM)
+def test_torque_at_makers_feed_with_chambers(pressure, feed, kind):
+    air = with_chambers("dth5", pressure)
+    scene = air.replace(**parameters_under(rock(kind), air), **{"feed.force": feed})
+    run = simulate(scene, 3.0, settle=1.0, record_events=False, error_estimate=False)
+    assert 150.0 < run.counted["rotation_torque"].mean() < 900.0
