@@ -35,10 +35,16 @@ SIZES_ROW = 0
 def longer_steps(scene: Scene) -> dict[str, float]:
     """Steps of components that are on, longer, so that runs with them tell what steps cost.
 
-    A component has such a step as its parameter `step`.
+    A component has such a step as its parameter `step`. Where a longer one may not be, half of it
+    tells nearly as much.
     """
-    keys = (f"{one.name}.step" for one in COMPONENTS if "step" in one.parameters)
-    return {key: LONGER_STEPS * scene[key] for key in keys if scene.matters(key)}
+    steps = {one.name: one.parameters["step"] for one in COMPONENTS if "step" in one.parameters}
+    found = {f"{name}.step": longest for name, (*_, longest) in steps.items()}
+    return {
+        key: scene[key] * (LONGER_STEPS if LONGER_STEPS * scene[key] <= longest else 0.5)
+        for key, longest in found.items()
+        if scene.matters(key)
+    }
 
 
 class ModalSolver(EngineSolver):

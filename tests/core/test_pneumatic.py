@@ -232,6 +232,14 @@ def test_work_of_the_gas_is_the_work_that_the_solver_gave(runs):
         assert abs(runs[name].energy["residual_relative"]) < 1e-9
 
 
+@pytest.mark.parametrize(("step", "other"), [(3e-4, 3e-4 * math.sqrt(2.0)), (1e-3, 5e-4)])
+@pytest.mark.parametrize("name", ["modal", "wave", "fem", "rigid"])
+def test_runs_that_tell_the_error_have_another_step(name, step, other):
+    """Half of it where a longer one may not be."""
+    scenes = Simulation(drilling(name, **{"pneumatic.step": step})).solver.coarser_scenes()
+    assert scenes[0]["pneumatic.step"] == pytest.approx(other)
+
+
 def test_mass_and_energy_of_the_gas_close_over_long_drilling():
     """To 1e-12 of what passed through; an hour with PERCUSSION_LONG."""
     simulation, seen = Simulation(drilling("rigid")), []
