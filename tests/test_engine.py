@@ -22,6 +22,7 @@ from percussion_model.engine.fault_texts import fault_text
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.library import _exports, module_of
 from percussion_model.engine.platforms import this_platform
+from percussion_model.physics.kernel import kernel
 from percussion_model.physics.records import SAMPLE_FIELDS
 
 THREADS = 6
@@ -111,29 +112,67 @@ def test_facts_stand_in_the_texts_of_faults():
 
 
 def test_what_is_used_of_numba_and_llvm_is_there(tmp_path):
-    """With a release of them that fails here, mend `engine/objects.py` and `engine/loading.py`."""
+    """With a release of them that fails here, mend what imports numba in `engine`.
+
+    The second time, what is kept of the first is used, but for the edited function and its caller.
+    """
     from percussion_model.engine.loading import load_objects
 
     (tmp_path / "small_entries.py").write_text(
         "import numpy as np\n"
         "from percussion_model.engine.memory import floats_at\n"
-        "from percussion_model.physics.kernel import preparing\n"
+        "from percussion_model.physics.kernel import kernel, preparing\n"
+        "from small_sums import times\n"
         "EXPORTED = {'small_sum': ('add_up', 'n:ww')}\n"
+        "@kernel\n"
+        "def add(one, other):\n"
+        "    return one + other\n"
         "@preparing\n"
         "def add_up(address, count):\n"
         "    room = np.zeros(count)\n"
         "    room[:] = floats_at(address, count)\n"
-        "    return room.sum()\n"
+        "    return times(add(room.sum(), 0.0))\n"
     )
     # in a process of its own, as always: here numba would go on with functions without code
     path = os.pathsep.join((str(tmp_path), *sys.path))
-    command = [sys.executable, "-m", "percussion_model.engine.objects", "small_entries", tmp_path]
-    subprocess.run([*command, this_platform()], check=True, env={**os.environ, "PYTHONPATH": path})
-    address_of, suffix, _ = load_objects(sorted(tmp_path.glob("*.o")))
+    command = [sys.executable, "-m", "percussion_model.engine.objects", "small_entries"]
+    command += [tmp_path / "translations", tmp_path, this_platform()]
     call = ctypes.PYFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
     numbers = np.arange(5.0)
-    add_up = call(address_of(f"small_sum{suffix}"))
-    assert add_up(numbers.ctypes.data, len(numbers)) == 10.0
+    made = []
+    for factor in (2, 30):
+        (tmp_path / "small_sums.py").write_text(
+            "from percussion_model.physics.kernel import kernel\n"
+            f"FACTOR = {factor}.0\n"
+            "@kernel\n"
+            "def times(number):\n"
+            "    return FACTOR * number\n"
+        )
+        subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": path})
+        address_of, suffix, _ = load_objects(sorted(tmp_path.glob("*.o")))
+        add_up = call(address_of(f"small_sum{suffix}"))
+        assert add_up(numbers.ctypes.data, len(numbers)) == 10.0 * factor
+        _, _, libraries, _ = pickle.loads((tmp_path / "translations").read_bytes())
+        made.append({one.code for one in libraries if one.name in ("add", "times", "add_up")})
+    assert [len(one) for one in made] == [3, 3]
+    assert len(made[0] & made[1]) == 1
+
+
+def test_what_a_kernel_holds_tells_when_to_translate_it_anew():
+    from percussion_model.engine.compiled_memory import records_at
+    from percussion_model.engine.translations import content_of
+
+    def holding(limit, called, words=""):
+        source = f"def one(x):\n    '{words}'\n    return called(min(x, limit))\n"
+        names = {"called": called, "limit": limit, "__name__": "user_component"}
+        exec(source, names)
+        return content_of(kernel(names["one"]))
+
+    least, other = kernel(lambda x: x + 1.0), kernel(lambda x: x + 2.0)
+    assert holding(1.0, least) == holding(1.0, least, "Least of two.")
+    assert len({holding(1.0, least), holding(2.0, least), holding(1.0, other)}) == 3
+    kinds = [np.dtype([(name, float)]) for name in ("time", "force")]
+    assert len({content_of(records_at(kind)) for kind in kinds}) == 2
 
 
 def test_libraries_for_windows_name_what_they_export():

@@ -108,8 +108,12 @@ def hash_of(files: Iterable[Path], *words: str) -> str:
 @functools.cache
 def stamp_of(module: str) -> str:
     """Hash of all that the objects of a module follow from."""
-    words = [f"{name} {version(name)}" for name in COMPILERS]
-    return hash_of(sources_of(module), *words)
+    return hash_of(sources_of(module), *versions())
+
+
+def versions() -> list[str]:
+    """Names and versions of what compiles."""
+    return [f"{name} {version(name)}" for name in COMPILERS]
 
 
 def kept_folders() -> list[Path]:
@@ -280,7 +284,9 @@ def _make_one(module: str, platforms: Sequence[str], kept: Path) -> None:
             plain["PYTHONPATH"] = str(ROOT)
         out = Path(work) / "objects"
         out.mkdir()
-        command = [python(), "-m", f"{NAME}.engine.objects", module, str(out), *platforms]
+        translations = kept / f"{module.rpartition('.')[2]}.translations"
+        command = [python(), "-m", f"{NAME}.engine.objects"]
+        command += [module, str(translations), str(out), *platforms]
         done = subprocess.run(
             command, env=os.environ | plain, cwd=work, text=True, capture_output=True
         )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,7 +27,8 @@ from numba.core.cpu import CPUContext
 from percussion_model.engine.entries import ENTRIES, SOLVERS
 from percussion_model.engine.orphans import end_with_parent
 from percussion_model.engine.platforms import PLATFORMS
-from percussion_model.physics.compiling import add_callees_first, module_of
+from percussion_model.engine.translations import Translations, stamp_of_translations
+from percussion_model.physics import compiling
 
 _KINDS = {"w": types.int64, "n": types.float64}
 # What an entry returns where memory ends: Fault.MEMORY.
@@ -41,6 +43,10 @@ ALLOWED = frozenset(
         *("acos", "atanh", "fmod", "sincos"),
     ]
 )
+
+
+# First argument of a process that makes one object.
+WRITE = "--write"
 
 
 class Build(NamedTuple):
@@ -154,17 +160,20 @@ def compile_entries(entries: Mapping[str, Exported]) -> str:
     wrappers, libraries = [], dict[int, Any]()
     with _each_by_itself():
         for name, one in entries.items():
+            fresh = njit(error_model="numpy")(one.function.py_func)
+            if compiling.keeper_of is not None:
+                fresh._cache = compiling.keeper_of(fresh.py_func, {})
             # a result of True or False is a whole number to C
-            fresh = njit(one.result(*one.arguments), error_model="numpy")(one.function.py_func)
+            fresh.compile(one.result(*one.arguments))
             (compiled,) = fresh.overloads.values()
             wrappers.append(_wrapper(name, compiled.fndesc.llvm_func_name, one))
-            add_callees_first(compiled.library, libraries)
+            compiling.add_callees_first(compiled.library, libraries)
         whole = llvm.parse_assembly("")
         for text in wrappers:
             whole.link_in(llvm.parse_assembly(text))
         # what nothing calls yet is left out: so what calls comes before what is called
         for library in reversed(libraries.values()):
-            whole.link_in(module_of(library), preserve=True)
+            whole.link_in(compiling.module_of(library), preserve=True)
     return _counting_plainly(_without_words(str(whole)))
 
 
@@ -308,24 +317,52 @@ def make_object(text: str, triple: str, build: Build, names: Iterable[str]) -> b
     return code
 
 
-def write_objects(text: str, names: Iterable[str], platform: str, folder: Path) -> list[Path]:
-    """Write the objects of a module for a platform, `<platform>_<build>.o`; as `make_object`."""
-    files = []
-    for build in BUILDS[platform.partition("-")[0]]:
-        files.append(folder / f"{platform}{build.suffix}.o")
-        files[-1].write_bytes(make_object(text, PLATFORMS[platform].triple, build, names))
-    return files
+def write_object(file: Path, platform: str, build: Build, names: Iterable[str]) -> None:
+    """Write an object of a module beside the module's text, `<platform>_<build>.o`.
+
+    Parameters
+    ----------
+    file : Path
+        With what `compile_entries` gives.
+    platform : str
+        Of `PLATFORMS`.
+    build, names
+        As of `make_object`.
+    """
+    code = make_object(file.read_text(), PLATFORMS[platform].triple, build, names)
+    (file.parent / f"{platform}{build.suffix}.o").write_bytes(code)
 
 
-def main(module: str, folder: str, *platforms: str) -> None:
-    """Write the objects of a module's entries for platforms into a folder."""
+def main(module: str, kept: str, folder: str, *platforms: str) -> None:
+    """Write the objects of a module's entries for platforms into a folder.
+
+    Parameters
+    ----------
+    module : str
+    kept : str
+        File of the translations of its kernels (`Translations`).
+    folder : str
+    *platforms : str
+    """
     gc.disable()  # it would take a tenth of the time, and find nothing
     entries = exported_by(module)
-    text = compile_entries(entries)
-    for platform in platforms:
-        write_objects(text, entries, platform, Path(folder))
+    translations = Translations(Path(kept), stamp_of_translations(module))
+    text = Path(folder) / "entries.ll"
+    text.write_text(compile_entries(entries))
+    translations.save()
+    builds = [(one, *build) for one in platforms for build in BUILDS[one.partition("-")[0]]]
+    # each in a process: LLVM works in one thread at a time
+    command = [sys.executable, "-m", __spec__.name, WRITE, str(text)]
+    running = [subprocess.Popen([*command, *build, *entries]) for build in builds]
+    if any(process.wait() for process in running):
+        sys.exit("an object could not be made")
+    text.unlink()
 
 
 if __name__ == "__main__":
     end_with_parent()
-    main(*sys.argv[1:])
+    if sys.argv[1] == WRITE:
+        file, platform, cpu, features, suffix, *names = sys.argv[2:]
+        write_object(Path(file), platform, Build(cpu, features, suffix), names)
+    else:
+        main(*sys.argv[1:])

@@ -92,7 +92,7 @@ def opened(par, area, share):
     return par.pneumatic_discharge * (area * min(max(share, 0.0), 1.0) + par.pneumatic_leak)
 
 
-@kernel
+@inlined
 def rates_of(par, air, around, y, bounds):
     """What changes in a second; `x` and `v` as those of a free piston above a bit at rest.
 

@@ -36,7 +36,11 @@ sys.setrecursionlimit(max(sys.getrecursionlimit(), DEEPEST))
 # Numba writes out types at each of its steps, where records have a hundred fields: a fifth of all
 # compiling.
 Record.__repr__ = functools.cache(Record.__repr__)  # type: ignore[method-assign]
+# Attribute of a plain function with what writes the instructions in its place (one).
+INSTRUCTIONS = "_instructions"
 _log = logging.getLogger("percussion_model")
+# What keeps translations of a function with these options from one process to the next, if any.
+keeper_of: Callable[[Callable, dict[str, Any]], Any] | None = None
 
 
 def dispatcher_of(function: Callable, is_kept: bool, options: dict[str, Any]) -> Any:
@@ -76,6 +80,8 @@ def _called_by_others(made: Any, options: dict[str, Any]) -> Any:
     which takes a sixth of all compiling.
     """
     translated = njit(pipeline_class=_Translator, **options)(made.py_func)
+    if keeper_of is not None:
+        translated._cache = keeper_of(made.py_func, options)
 
     def find(arguments: Any, named: Any) -> Any:
         named = {name: types.unliteral(kind) for name, kind in named.items()}
@@ -187,6 +193,7 @@ def instruct(function: Callable, define: Callable) -> None:
         What `numba.extending.intrinsic` takes: from the types of the arguments, the signature
         and what writes the instructions.
     """
+    setattr(function, INSTRUCTIONS, (define,))
     template = make_intrinsic_template(function, define, function.__name__)
     infer(template)
     infer_global(function, types.Function(template))

@@ -177,7 +177,9 @@ def entry_of(function: Callable) -> Callable:
 # `_nrt=False` leaves out numba's runtime: arrays are passed without reference
 # counting (which took most of a step's time), and a kernel that allocates does
 # not compile, so that it can always be built ahead of time.
-kernel = compiled(error_model="numpy", _nrt=False)
+# `forceinline` is said each time: else numba hands it down from a caller, and what `inlined`
+# kernels call stands a hundred times in one function, which takes minutes to optimise.
+kernel = compiled(error_model="numpy", _nrt=False, forceinline=False)
 
 
 def plain(function: Callable) -> Callable:
@@ -201,18 +203,18 @@ def preparing(function: Callable) -> Callable:
 
     Ahead of time, the library brings the memory.
     """
-    made: Callable = compiled(error_model="numpy")(function)
+    made: Callable = compiled(error_model="numpy", forceinline=False)(function)
     return made
 
 
 # For calls of other libraries, which may wait for threads that want to run Python.
-nogil = compiled(error_model="numpy", _nrt=False, nogil=True)
+nogil = compiled(error_model="numpy", _nrt=False, forceinline=False, nogil=True)
 
 # For what runs in every step: arrays cost nine words an argument to pass.
 inlined = compiled(error_model="numpy", _nrt=False, forceinline=True)
 
 # For functions of numbers, which plain Python calls here and there, without numba.
-scalar = compiled(is_scalar=True, error_model="numpy", _nrt=False)
+scalar = compiled(is_scalar=True, error_model="numpy", _nrt=False, forceinline=False)
 inlined_scalar = compiled(is_scalar=True, error_model="numpy", _nrt=False, forceinline=True)
 
 # For long recursions, whose latency counts: a product and a sum may be one operation

@@ -106,7 +106,7 @@ def pilot_port(par, way):
     return par.hydraulic_pilot_port * share if way > 0.0 else 0.0
 
 
-@kernel
+@inlined
 def rates_of(par, pump, y):
     """What changes in a second; the piston is free, and the casing stands still."""
     bulk, air, least = par.hydraulic_bulk_modulus, par.hydraulic_air, par.hydraulic_vapour_pressure
