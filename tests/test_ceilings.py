@@ -10,6 +10,7 @@ from percussion_model.analysis import stationary
 from percussion_model.analysis.cost import explained, forecast
 from percussion_model.analysis.stationary import settled
 from percussion_model.interface.commands.scene import settled as settled_command
+from percussion_model.simulation import runner
 from percussion_model.simulation import simulate as runs
 from percussion_model.solvers import base
 from percussion_model.solvers.base import make_solver
@@ -83,7 +84,7 @@ def test_the_command_has_the_same_ceiling():
 def test_looking_at_the_clock_changes_no_bit(solver, monkeypatch):
     scene = Scene().computed_by(solver)
     whole = settled(scene)
-    monkeypatch.setattr(stationary, "CELL_STEPS", 2e4)
+    monkeypatch.setattr(runner, "CELL_STEPS", 2e4)
     monkeypatch.setattr(base, "USUAL_STEP", 5e-8)
     pieces = settled(scene)
     assert whole.blows.tobytes() == pieces.blows.tobytes()

@@ -6,60 +6,36 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from percussion_model.physics.records import BLOW
+from percussion_model.physics.settling import (
+    STALLED_AFTER,
+    Verdict,
+    multiplier_of,
+    request_for,
+)
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.error_estimate import FIRST_ORDER, with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
-from percussion_model.simulation.rate import STALLED_PERIODS, rate_of_blows, ratio_of_sums
-from percussion_model.simulation.result import Result, end_of
+from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
+from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
 from percussion_model.simulation.warnings import warnings_of_motion
 
-# A run in which no blow ends for so long [s], and `STALLED_PERIODS` of the last, has stalled.
-STALLED_AFTER = 2.0
 # The standard error is first believed after so many blows, and checked again
 # when there are so many times more.
 FEWEST_SCATTERED, NEXT_CHECK = 100, 1.25
 # A motion is aperiodic that has not settled after so many blows.
 MOST_BLOWS = 400
-# Processor time after which a run that has not settled is given up [s]. It is looked at after
-# so many steps of a cell.
-MOST_TIME, CELL_STEPS = 300.0, 1e7
-# Longest cycle that is looked for [blows].
-MOST_BLOWS_A_CYCLE = 8
+# Processor time after which a run that has not settled is given up [s].
+MOST_TIME = 300.0
 # Blows look alike long before a motor has its speed, to 1e-4: after so many of its responses.
 MOTOR_SETTLES = 10.0
-# Two changes that fall alike take so many blows: looking earlier is in vain.
-FEWEST_BLOWS = 4
-# Many blows are looked at again when there is one more for so many.
-LOOK_AGAIN = 16
-# Blows converge if their changes fall from so many tolerances on, each by this factor at
-# least, and the factors are alike within that one.
-FAR, FALLING, ALIKE = 10.0, 0.9, 3.0
-# They must have done so for this share of all blows run: a motion that wanders, too, comes
-# by chance upon a few blows that fall evenly, and leaves them again.
-DIRECT = 0.5
-# So many at least: two fall evenly by chance where a motion comes near quickly and then wanders.
-LEAST_FACTORS = 3.0
-# Where changes are below this share of the tolerance, no scatter is left to hide anything.
-STILL = 1e-4
-# A cycle of several blows, or one that only scatters without converging any more, is believed
-# after so many repetitions and blows: near a threshold one blow in twenty may be quite another.
-REPETITIONS, LASTING = 5, 60
-# Numbers of a blow by which two blows are the same.
-COMPARED = ("impact_velocity", "period", "penetration")
-# Their places in a row, whose fields are words of eight bytes.
-_COLUMNS = [(BLOW.names or ()).index(name) for name in COMPARED]
-# Differences within a cycle that fall by less than this from one cycle to the next will stay.
-STEADY = 0.9
 # With fewer blows allowed nothing is known of an aperiodic motion.
 LEAST_LIMIT = 32
 # Numbers whose errors by the grid are estimated: rate, period, and other means over blows.
@@ -197,7 +173,8 @@ class Settled:
         earlier = len(self.blows) - self.order
         if math.isnan(self.multiplier) or self.same_motion is False or earlier <= 2 * self.order:
             return math.nan
-        before = _multiplier(self.blows[:earlier], self.order)
+        last = self.blows["impact_velocity"][earlier - 1 :: -self.order][:3]
+        before = multiplier_of(*last)
         off = [abs(other.multiplier - self.multiplier) for other in self.others]
         return abs(self.multiplier - before) + FIRST_ORDER * float(np.max(off, initial=0.0))
 
@@ -339,7 +316,7 @@ def settled(
         raise SceneError(f"most_time = {most_time!r} s: must be above 0 s")
     began = time.thread_time()
     simulation = Simulation(scene, record_events=False)
-    blows, next_check = simulation.blows, float(FEWEST_SCATTERED)
+    blows = simulation.blows
     slowest = MOTOR_SETTLES * scene["rotation.response"] if scene.motor_stalls else 0.0
 
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
@@ -358,28 +335,20 @@ def settled(
             found = replace(found, grid_errors=_grid_errors(simulation, settling))
         return found
 
-    while len(blows) < most_blows:
-        ended, patience = end_of(blows), STALLED_AFTER
-        if len(blows):
-            patience += STALLED_PERIODS * float(blows["period"][-1])
-        before = len(blows)
-        until = max(simulation.time, ended + patience)
-        more = max(1, FEWEST_BLOWS - before, before // LOOK_AGAIN)
-        _advance(simulation, min(more, most_blows - before), until, began + most_time)
-        blows = simulation.blows
-        if len(blows) == before:
+    asked = request_for(tolerance, most_blows, slowest)
+    if scatter:
+        asked[0].enough = FEWEST_SCATTERED
+    while True:
+        simulation.settle(asked, progress, began + most_time)
+        found, blows = asked[0], simulation.blows
+        if found.verdict == Verdict.STALLED:
             return made("stalled", 0, math.nan, math.nan, math.nan)
-        if progress is not None:
-            progress(len(blows))
-        if simulation.time >= slowest:
-            for order, found in cycles_in(blows, tolerance).items():
-                return made("periodic", order, *found)
-        if scatter and len(blows) >= next_check:
-            next_check = NEXT_CHECK * len(blows)
-            rate, error = rate_of_blows(after_settling(blows))
-            if error <= scatter * abs(rate):
-                break
-    return made("aperiodic", 0, *rate_of_blows(after_settling(blows)), math.nan)
+        if found.verdict == Verdict.PERIODIC:
+            return made("periodic", int(found.order), found.rate, found.error, found.multiplier)
+        rate, error = rate_of_blows(after_settling(blows))
+        if len(blows) >= most_blows or error <= scatter * abs(rate):
+            return made("aperiodic", 0, rate, error, math.nan)
+        asked[0].verdict, asked[0].enough = Verdict.OPEN, NEXT_CHECK * len(blows)
 
 
 def _other_motions(
@@ -424,29 +393,6 @@ def _run(scene: Scene) -> Result:
     return simulation.result()
 
 
-def _advance(simulation: Simulation, count: int, until: float, deadline: float) -> None:
-    """Run until so many more blows have ended, or else up to a time [s].
-
-    In pieces, so that it can be given up at the deadline; they depend on the scene alone.
-
-    Parameters
-    ----------
-    deadline : float
-        As `time.thread_time` tells it [s].
-    """
-    piece = simulation.solver.time_of_steps(CELL_STEPS)
-    wanted = simulation.blow_rows + count
-    while simulation.blow_rows < wanted and simulation.time < until:
-        if time.thread_time() > deadline:
-            raise SimulationError(
-                f"at t = {simulation.time:.6g} s, after {simulation.blow_rows} blows: the run has "
-                "taken all the time that it may (--most-time, most_time) and has not settled: "
-                "`percussion explain` tells what a blow costs; take fewer cells"
-            )
-        left = wanted - simulation.blow_rows
-        simulation.advance_blows(left, min(simulation.time + piece, until))
-
-
 def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:
     """Raise `SceneError` for arguments of `settled` that make no sense."""
     if scene.piston.model == "absent":
@@ -458,141 +404,6 @@ def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: floa
     if most_blows < LEAST_LIMIT:
         least = f"must be a whole number from {LEAST_LIMIT} on"
         raise SceneError(f"most_blows = {most_blows!r}: {least}")
-
-
-def cycles_in(blows: np.ndarray, tolerance: float) -> dict[int, tuple[float, float, float]]:
-    """Cycles that the last blows could be, by order; values as from `cycle`."""
-    recent = _compared(blows[-MOST_BLOWS_A_CYCLE - 1 :])[::-1]
-    scale = np.abs(recent).max(axis=0)
-    scale[scale == 0.0] = 1.0
-    change = (np.abs(recent[1:] - recent[0]) / scale).max(axis=1)
-    found = {
-        order: cycle(blows, order, tolerance)
-        for order, most in enumerate(change.tolist(), 1)
-        # else `cycle` would refuse, at a greater cost
-        if most <= tolerance
-        and (order == 1 or most <= STILL * tolerance or _lasts(blows, order))
-        and not _still_shrinking(blows, order)
-    }
-    return {order: values for order, values in found.items() if values is not None}
-
-
-def _repetitions(order: int) -> int:
-    """How often a cycle must repeat that only scatters."""
-    return max(REPETITIONS, math.ceil(LASTING / order))
-
-
-def _lasts(blows: np.ndarray, order: int) -> bool:
-    """Whether there are blows enough to believe in a cycle that only scatters."""
-    return len(blows) >= _repetitions(order) * order
-
-
-def cycle(blows: np.ndarray, order: int, tolerance: float) -> tuple[float, float, float] | None:
-    """Rate, its error and the multiplier of a cycle of `order` blows, None if it is none."""
-    if len(blows) < 3 * order:
-        return None
-    changes = _by_cycle(blows, order)
-    newer, older = changes[0], changes[1]
-    if max(newer, older) <= STILL * tolerance:
-        return _limit(blows, order)
-    if newer > tolerance:
-        return None
-    ratio = newer / older if older > 0 else 1.0
-    to_come = newer * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
-    if order == 1 and to_come <= tolerance and _converges(changes, tolerance):
-        return _limit(blows, order)
-    if not _lasts(blows, order):
-        return None
-    repetitions = _repetitions(order)
-    rows = blows[-repetitions * order :]
-    steps = _changes(rows, order)
-    largest = np.max(np.abs(steps))
-    # What still drifts one way, however slowly, has not arrived.
-    drift = np.max(np.abs(steps.reshape(repetitions - 1, -1).sum(axis=0)))
-    return _scattering(rows, order) if drift <= largest <= tolerance else None
-
-
-def _by_cycle(blows: np.ndarray, order: int) -> list[float]:
-    """Largest relative change from cycle to cycle, the newest first."""
-    count = len(blows) // order
-    changes = np.abs(_changes(blows[-count * order :], order))
-    found: list[float] = changes.reshape(count - 1, -1).max(axis=1)[::-1].tolist()
-    return found
-
-
-def _converges(changes: list[float], tolerance: float) -> bool:
-    """Whether changes from cycle to cycle, the newest first, fall evenly from afar."""
-    factors: list[float] = []
-    for newer, older in pairwise(changes):
-        if older == 0.0:
-            break
-        factor = newer / older
-        alike = not factors or factor / ALIKE <= factors[-1] <= factor * ALIKE
-        if factor > FALLING or not alike:
-            break
-        factors.append(factor)
-    enough = max(LEAST_FACTORS, DIRECT * len(changes))
-    return len(factors) >= enough and changes[len(factors)] >= FAR * tolerance
-
-
-def _still_shrinking(blows: np.ndarray, order: int) -> bool:
-    """Whether blows that alternate will yet agree, so that the cycle is a part of this one."""
-    for part in range(1, order):
-        if order % part == 0 and len(blows) >= 3 * order:
-            deviation = np.abs(_changes(blows[-2 * order - part :], part))
-            if np.max(deviation[order:]) < STEADY * np.max(deviation[:order]):
-                return True
-    return False
-
-
-def _compared(blows: np.ndarray) -> np.ndarray:
-    """Numbers of `COMPARED`, a row for each blow."""
-    return np.asarray(blows.view(np.float64).reshape(len(blows), -1)[:, _COLUMNS])
-
-
-def _changes(blows: np.ndarray, order: int) -> np.ndarray:
-    """Relative change of each number of `COMPARED` over a cycle, a row for each blow."""
-    values = _compared(blows)
-    scale = np.abs(values[-order:]).sum(axis=0) / order
-    scale[scale == 0.0] = 1.0
-    return (values[order:] - values[:-order]) / scale
-
-
-def _rates(blows: np.ndarray, order: int) -> np.ndarray:
-    """Mean rate over each run of `order` blows, one after the other [m/s]."""
-    whole = len(blows) // order * order
-    advance = blows["hole_advance"][-whole:].reshape(-1, order).sum(axis=1)
-    return np.asarray(advance / blows["period"][-whole:].reshape(-1, order).sum(axis=1))
-
-
-def _limit(blows: np.ndarray, order: int) -> tuple[float, float, float]:
-    """Limit of a converging cycle: rate, error and multiplier."""
-    second, third = _rates(blows[-2 * order :], order).tolist()
-    change = third - second
-    ratio = _multiplier(blows, order)
-    shift = change * ratio / (1.0 - ratio) if abs(ratio) < 1.0 else 0.0
-    # Extrapolating by more than the last change would trust the ratio too far.
-    shift = max(-abs(change), min(shift, abs(change)))
-    # Between cycles that agree to rounding the ratio of changes says nothing.
-    return (
-        float(third + shift),
-        float(abs(change) + abs(shift)),
-        ratio if abs(ratio) < 1 else math.nan,
-    )
-
-
-def _multiplier(blows: np.ndarray, order: int) -> float:
-    """Ratio of the last two changes of the impact velocity over a cycle."""
-    velocity = blows["impact_velocity"]
-    newer = velocity[-1] - velocity[-1 - order]
-    older = velocity[-1 - order] - velocity[-1 - 2 * order]
-    return float(newer / older) if older != 0.0 else 0.0
-
-
-def _scattering(blows: np.ndarray, order: int) -> tuple[float, float, float]:
-    """Mean of cycles that only scatter: rate, scatter; the multiplier cannot be told."""
-    rates = _rates(blows, order)
-    return float(np.mean(rates)), float(np.ptp(rates)), math.nan
 
 
 def after_settling(blows: np.ndarray) -> np.ndarray:

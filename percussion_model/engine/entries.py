@@ -37,6 +37,8 @@ ENTRIES = {
     # base, moving, copy, whether to advance, times, count, reading, rows, blows, room, events,
     # room, whether events are listed, count of rows -> Status
     "sample": "w:wwwwwwwwwwwwww",
+    # base, moving, what is asked (`settling.REQUEST`), blows, room -> Status
+    "settle": "w:wwwww",
     # base, moving, time, facts -> number of a fault
     "find_fault": "w:wwnw",
     # base, moving -> stress at the gauge

@@ -23,6 +23,7 @@ from percussion_model.engine.memory import (
 )
 from percussion_model.engine.records import ADVANCE, GaugeBar, Kind, work_at
 from percussion_model.engine.sampling import sampler
+from percussion_model.engine.settling import settler
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
 from percussion_model.solvers.fem.advance import run as run_task
@@ -249,3 +250,4 @@ def fields(base, moving, bar, masses, made, modes, count, force, velocity):
 
 
 sample = sampler(run, read, state_time, time_of_blow)
+settle = settler(run, state_time)

@@ -30,6 +30,7 @@ from percussion_model.engine.memory import (
 )
 from percussion_model.engine.records import ADVANCE, GaugeBar, Kind, work_at
 from percussion_model.engine.sampling import sampler
+from percussion_model.engine.settling import settler
 from percussion_model.physics.kernel import preparing
 from percussion_model.solvers.cells import find_cell
 from percussion_model.solvers.modal.advance import TICK_ROUNDING, portion
@@ -471,3 +472,4 @@ def fields(base, moving, bar, masses, made, modes, count, force, velocity):
 
 
 sample = sampler(run, read, state_time, time_of_blow)
+settle = settler(run, state_time)

@@ -10,6 +10,7 @@ from percussion_model.engine.image import new_values, numbers_in
 from percussion_model.engine.memory import floats_at, hold
 from percussion_model.engine.records import ADVANCE, Kind, work_at
 from percussion_model.engine.sampling import sampler
+from percussion_model.engine.settling import settler
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import Status
 from percussion_model.solvers.rigid import advance as kernels
@@ -137,3 +138,4 @@ def stress(base, moving):
 
 
 sample = sampler(run, read, state_time, time_of_blow)
+settle = settler(run, state_time)

@@ -319,6 +319,14 @@ class EngineSolver(Solver):
         for name, value in inputs.items():
             state.numbers[words[INPUTS[name].field]] = value
 
+    def settle(self, state: State, asked: np.ndarray, blows: np.ndarray) -> int:
+        """Run until blows repeat; as in `Solver`."""
+        with self._lock:
+            status: int = self._entries.settle(
+                self._base, state.address, asked.ctypes.data, blows.ctypes.data, len(blows)
+            )
+        return status
+
     # samples
 
     def sample(self, state: State, times: np.ndarray, out: np.ndarray) -> None:

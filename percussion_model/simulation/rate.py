@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from percussion_model.physics.settling import STALLED_PERIODS
+
 # Fewer whole blows than this tell no rate.
 LEAST_BLOWS = 3
 # A rate that is known no better than this, relative to it, deserves a warning.
@@ -21,8 +23,6 @@ FEWEST_DEPENDENT = 20
 STRETCH = 0.25
 # A hole that advances less in a blow does not: that is rounding of its depth [m].
 LEAST_ADVANCE = 1e-13
-# A hammer has stalled that begins no blow for so many periods of its longest.
-STALLED_PERIODS = 4.0
 
 
 def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
+from percussion_model.physics.settling import Verdict
 from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene
@@ -22,6 +23,8 @@ _EVENT_ROOM = 4096
 # Solvers whose kernels are compiled in this process; a scene does not change them.
 _compiled: set[str] = set()
 
+# Steps of a cell after which a run that is to settle is looked at.
+CELL_STEPS = 5e7
 _DONE, _FULL = int(Status.DONE), (int(Status.BLOWS_FULL), int(Status.EVENTS_FULL))
 
 
@@ -53,6 +56,7 @@ class Runner:
         self._time = 0.0
         self._blow_room = np.zeros(_BLOW_ROOM, BLOW)
         self._event_room = np.zeros(_EVENT_ROOM if record_events else 1, EVENT)
+        self._settling: np.ndarray | None = None  # blows of a run until they repeat
         self._ahead: State | None = None  # an old copy of the state, to be used again
         self._can_sample = False
         if solver is None and self.solver.name not in _compiled:
@@ -126,6 +130,45 @@ class Runner:
             count -= found
         reached = float(t) if count > 0 else self.solver.time(self._state)
         self._time = max(self._time, reached)
+        self.wall_time += time.perf_counter() - began
+
+    def settle(
+        self, asked: np.ndarray, progress: Callable[[int], None] | None, deadline: float
+    ) -> None:
+        """Let a simulation that has not begun run until its blows repeat, or are enough.
+
+        Parameters
+        ----------
+        asked : ndarray of REQUEST, shape (1,)
+            What is asked and found; a further call goes on.
+        progress : callable, optional
+            Called with the blows done.
+        deadline : float
+            As `time.thread_time` tells it [s].
+
+        Raises
+        ------
+        SimulationError
+            If the run cannot continue, or comes to the deadline.
+        """
+        began, one = time.perf_counter(), asked[0]
+        if self._settling is None:
+            self._settling = np.zeros(int(one.most), BLOW)
+        # in pieces that depend on the scene alone, so that it can be given up
+        piece = self.solver.time_of_steps(CELL_STEPS)
+        while one.verdict == Verdict.OPEN:
+            before, one.until = int(one.blows), one.time + piece
+            if time.thread_time() > deadline:
+                raise SimulationError(
+                    f"at t = {self.time:.6g} s, after {before} blows: the run has taken all the "
+                    "time that it may (--most-time, most_time) and has not settled: `percussion "
+                    "explain` tells what a blow costs; take fewer cells"
+                )
+            status = self.solver.settle(self._state, asked, self._settling)
+            self._time = float(one.time)
+            self._take(status, int(one.blows) - before, 0, self._settling[before:])
+            if progress is not None:
+                progress(int(one.blows))
         self.wall_time += time.perf_counter() - began
 
     def _check_time(self, t: float) -> None:

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from percussion_model.physics import settling
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.scene import Scene
@@ -132,6 +133,36 @@ class Solver(ABC):
         if self.time_step is None:
             return count * USUAL_STEP
         return self.time_step * max(1.0, count / max(1, sum(self.cells.values())))
+
+    def settle(self, state: State, asked: np.ndarray, blows: np.ndarray) -> int:
+        """Run until the blows of a state at time zero repeat (`physics.settling`).
+
+        Parameters
+        ----------
+        state : State
+        asked : ndarray of REQUEST, shape (1,)
+            A record with what is asked and found; a further call goes on.
+        blows : ndarray of BLOW
+            Filled from the first on.
+
+        Returns
+        -------
+        int
+            `Status` of a run that cannot continue, else DONE.
+        """
+        one, rows = asked[0], blows.view(float).reshape(len(blows), -1)
+        n, judged = int(one.blows), int(one.judged)
+        wanted = settling.blows_wanted(judged, int(one.most))
+        stalled = max(settling.patience(rows, judged), one.time)
+        end, events = min(stalled, one.until), np.zeros(1, EVENT)
+        status, more, _ = self.advance(state, end, blows[n:wanted], events, False)
+        one.blows = n + more
+        if status not in (Status.DONE, Status.BLOWS_FULL):
+            return status
+        one.time = end if status == Status.DONE else max(one.time, self.time(state))
+        if one.blows >= wanted or one.time >= stalled:
+            settling.judge(rows, asked)
+        return int(Status.DONE)
 
     def commit(
         self, state: State, t: float, blows: np.ndarray, events: np.ndarray, record_events: bool
