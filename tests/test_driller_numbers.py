@@ -259,6 +259,16 @@ def test_hammers_on_air_are_told_to_be_starved_or_to_have_stalled():
     rest = {"start.gap": 0.047, "start.piston_velocity": 0.0, "effects.gravity": False}
     stalled = simulate(scene.replace(**rest, **{"pneumatic.leak": 0.0}), 0.5)
     assert any(text.startswith("the hammer has stalled: no whole") for text in stalled.warnings)
+    weak = simulate(scene.replace(**{"pneumatic.back_pressure": 10e5}), 1.0)
+    assert weak.rate_of_penetration == 0.0
+    assert any(text.startswith("no rock breaks: no blow") for text in weak.warnings)
+
+
+def test_a_pump_that_gives_all_it_can_is_told():
+    for pressure, is_told in ((150e5, False), (220e5, True)):
+        scene = with_chambers("hc25", pressure).replace(**{"run.error_estimate": False})
+        told = simulate(scene, 0.5).warnings
+        assert is_told == any("the pump gives too little oil" in text for text in told)
 
 
 def test_a_hammer_goes_up_a_mountain():

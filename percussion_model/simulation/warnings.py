@@ -47,6 +47,8 @@ MOST_VOID, MOST_EMPTY = 0.1, 0.01
 # Oil at a mean pressure below this share of what its pump may have is too little: valves let some
 # out, and lines swing.
 FED = 0.6
+# A hammer that takes this share of what the pump gives takes all.
+ALL = 0.99
 # Work that the oil has done and what bodies got may differ by this share.
 MOST_OFF = 0.01
 # No hammer takes so long for a blow [s].
@@ -232,10 +234,13 @@ def _about_oil(result: Result) -> Iterator[str]:
         return
     scene = result.scene
     set_to, found = scene["hydraulic.supply_pressure"], result.end["hydraulic_pressure"]
-    if 0.0 < found < FED * set_to:
+    oil, pump = result.counted["hydraulic_oil"], scene["hydraulic.flow"]
+    takes_all = len(oil) > 0 and float(oil.mean()) > ALL * pump
+    if 0.0 < found < (STARVED if takes_all else FED) * set_to:
         yield (
-            "the hammer is starved: the pump gives too little oil (hydraulic.flow), at a mean of "
-            f"{in_digits(found / 1e5)} bar, where {in_digits(set_to / 1e5)} bar are set"
+            f"the hammer is starved: the pump gives too little oil (hydraulic.flow, "
+            f"{in_digits(6e4 * pump)} l/min), at a mean of {in_digits(found / 1e5)} bar, where "
+            f"{in_digits(set_to / 1e5)} bar are set"
         )
     times = (result.end[f"hydraulic_{name}"] for name in ("void", "empty"))
     void, empty = (time / result.duration for time in times)
@@ -322,6 +327,11 @@ def _about_breaking(result: Result) -> Iterator[str]:
     if not (len(blows) and end):
         return
     if scene["effects.breaking"]:
+        if not blows["breaking_blow_volume"].any():
+            yield (
+                "no rock breaks: no blow loads a button beyond breaking.threshold = "
+                f"{scene['breaking.threshold']:.3g} J"
+            )
         yield from limit_note(end["breaking_limited"], end["breaking_volume"])
     if scene.motor_stalls:
         yield from jam_note(end["rotation_needed_torque"], scene["rotation.stall_torque"])
