@@ -11,7 +11,14 @@ import pytest
 from typer.testing import CliRunner
 
 from percussion_model import Scene, SceneError, settled, simulate
-from percussion_model.analysis.stationary import JUDGED, MEANS
+from percussion_model.analysis.stationary import (
+    FEWEST_SCATTERED,
+    JUDGED,
+    MEANS,
+    MOST_BLOWS,
+    NEXT_CHECK,
+    rate_so_far,
+)
 from percussion_model.interface.cli import app
 from percussion_model.interface.terminal import show_settled
 from percussion_model.physics import settling
@@ -314,6 +321,27 @@ def test_blows_that_alternate_while_they_converge_are_one_cycle():
     both = blows(8.0 + 0.01 * (-0.8) ** np.arange(60) + 0.02 * (-1.0) ** np.arange(60))
     orders = [order_of(both[:n]) for n in range(3, 60)]
     assert set(orders) == {0, 2}
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5, 0.8])
+def test_an_error_at_which_a_run_ends_is_not_small_by_chance(kept):
+    """What one blow keeps of the scatter of the one before; nominal are 68 and 95 %."""
+    random, off = np.random.default_rng(7), []
+    for _ in range(150):
+        shift = np.zeros(MOST_BLOWS)
+        for k, new in enumerate(random.standard_normal(MOST_BLOWS - 1)):
+            shift[k + 1] = kept * shift[k] + new
+        rows, n, check, error = blows(8.0 + 0.05 * shift), FEWEST_SCATTERED, 0.0, math.inf
+        while n < MOST_BLOWS:
+            if n >= check:
+                rate, error = rate_so_far(rows[:n])
+                check = NEXT_CHECK * n
+            if error <= 1e-3 * rate:
+                break
+            n = min(n + n // 16, MOST_BLOWS)
+        off.append(abs(rate - rate_of(8.0)) / error)
+    assert np.mean(np.array(off) < 1.0) > 0.55
+    assert np.mean(np.array(off) < 2.0) > 0.85
 
 
 def test_an_aperiodic_motion_ends_at_the_wanted_standard_error():

@@ -25,13 +25,17 @@ STRETCH = 0.25
 LEAST_ADVANCE = 1e-13
 
 
-def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
+def rate_of_blows(
+    blows: np.ndarray, stretches: Sequence[float] = (STRETCH,)
+) -> tuple[float, float]:
     """Advance of the hole by time over successive blows, and its standard error [m/s].
 
     Parameters
     ----------
     blows : ndarray of BLOW
         One after the other.
+    stretches : sequence of float
+        As of `ratios_of_sums`.
 
     Returns
     -------
@@ -40,7 +44,7 @@ def rate_of_blows(blows: np.ndarray) -> tuple[float, float]:
     """
     if len(blows) < LEAST_BLOWS:
         return math.nan, math.nan
-    return ratio_of_sums(advances(blows), blows["period"])
+    return ratio_of_sums(advances(blows), blows["period"], stretches)
 
 
 def advances(blows: np.ndarray) -> np.ndarray:
@@ -69,7 +73,9 @@ def has_stalled(periods: np.ndarray, ended: float, until: float) -> bool:
     return len(periods) > 0 and until - ended > STALLED_PERIODS * float(np.max(periods))
 
 
-def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
+def ratio_of_sums(
+    values: np.ndarray, weights: np.ndarray, stretches: Sequence[float] = (STRETCH,)
+) -> tuple[float, float]:
     """Ratio of the sums of two series of a motion, and its standard error.
 
     See `ratios_of_sums`.
@@ -84,7 +90,7 @@ def ratio_of_sums(values: np.ndarray, weights: np.ndarray) -> tuple[float, float
     ratio, standard_error : float
         The error is NaN for fewer than `LEAST_BLOWS` rows.
     """
-    ratios, errors = ratios_of_sums(values[np.newaxis], weights[np.newaxis])
+    ratios, errors = ratios_of_sums(values[np.newaxis], weights[np.newaxis], stretches)
     return float(ratios[0]), float(errors[0])
 
 
