@@ -98,7 +98,7 @@ def _of_class(value: type) -> str:
     if issubclass(value, enum.Enum):
         return f"{name} {[(one.name, one.value) for one in value]}"
     if issubclass(value, tuple):
-        return f"{name} {getattr(value, '_fields', ())}"
+        return f"{name} {getattr(value, '_fields', ())} {getattr(value, '_field_defaults', ())}"
     return f"{name} {_of_file(value)}"
 
 
@@ -120,7 +120,11 @@ def _of_function(value: FunctionType, inside: tuple[Any, ...]) -> str:
     if value in inside or _is_of_library(name):
         return name
     if id(value) not in _known:
-        used: list[Any] = [value.__defaults__]
+        used: list[Any] = [
+            value.__defaults__,
+            value.__kwdefaults__,
+            *value.__dict__.get(compiling.MAKERS, ()),
+        ]
         used += (cell.cell_contents for cell in value.__closure__ or ())
         words = [name, *map(_of_file, value.__dict__.get(compiling.INSTRUCTIONS, ()))]
         for code in _codes_of(value.__code__):

@@ -21,6 +21,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.core.types.npytypes import Record
 from numba.core.typing.templates import infer, infer_global, make_intrinsic_template
+from numba.extending import overload
 
 from percussion_model.physics import kept_kernels
 
@@ -36,8 +37,9 @@ sys.setrecursionlimit(max(sys.getrecursionlimit(), DEEPEST))
 # Numba writes out types at each of its steps, where records have a hundred fields: a fifth of all
 # compiling.
 Record.__repr__ = functools.cache(Record.__repr__)  # type: ignore[method-assign]
-# Attribute of a plain function with what writes the instructions in its place (one).
-INSTRUCTIONS = "_instructions"
+# Attributes of a plain function with what kernels have in its place: what writes instructions,
+# and what makes a function (one each).
+INSTRUCTIONS, MAKERS = "_instructions", "_makers"
 _log = logging.getLogger("percussion_model")
 # What keeps translations of a function with these options from one process to the next, if any.
 keeper_of: Callable[[Callable, dict[str, Any]], Any] | None = None
@@ -197,3 +199,17 @@ def instruct(function: Callable, define: Callable) -> None:
     template = make_intrinsic_template(function, define, function.__name__)
     infer(template)
     infer_global(function, types.Function(template))
+
+
+def replace(function: Callable, make: Callable) -> None:
+    """Let kernels that call a plain function have another in its place.
+
+    Parameters
+    ----------
+    function : callable
+        What plain Python calls.
+    make : callable
+        What `numba.extending.overload` takes: from the types of the arguments, that other one.
+    """
+    setattr(function, MAKERS, (make,))
+    overload(function)(make)

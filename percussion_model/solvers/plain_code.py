@@ -138,13 +138,15 @@ def _states(s, values):
 
 
 def _teach() -> None:
-    from numba.extending import overload, register_jitable
+    from numba.extending import register_jitable
+
+    from percussion_model.physics.compiling import replace
 
     for function in _FUNCTIONS:
         register_jitable(function)
-    overload(bars._plain)(_rows)
-    overload(setup.fill_components)(_parameters)
-    overload(setup.start_components)(_states)
+    replace(bars._plain, _rows)
+    replace(setup.fill_components, _parameters)
+    replace(setup.start_components, _states)
 
 
 when_compiling(_teach)
