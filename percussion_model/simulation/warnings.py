@@ -234,8 +234,8 @@ def _about_oil(result: Result) -> Iterator[str]:
         return
     scene = result.scene
     set_to, found = scene["hydraulic.supply_pressure"], result.end["hydraulic_pressure"]
-    oil, pump = result.counted["hydraulic_oil"], scene["hydraulic.flow"]
-    takes_all = len(oil) > 0 and float(oil.mean()) > ALL * pump
+    taken, pump = result.counted["hydraulic_oil"], scene["hydraulic.flow"]
+    takes_all = len(taken) > 0 and float(taken.mean()) > ALL * pump
     if 0.0 < found < (STARVED if takes_all else FED) * set_to:
         yield (
             f"the hammer is starved: the pump gives too little oil (hydraulic.flow, "
