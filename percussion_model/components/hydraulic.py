@@ -16,6 +16,7 @@ import math
 
 from percussion_model.components import Component
 from percussion_model.physics.chambers import Way, is_past, moment_of, straight_slope
+from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 from percussion_model.physics.oil import REFERENCE, filling_of
 from percussion_model.physics.oil_chambers import (
@@ -51,7 +52,7 @@ def filled(par, pump, x):
     bulk, air = par.hydraulic_bulk_modulus, par.hydraulic_air
     line, tank = REFERENCE + pump.limit, REFERENCE + par.hydraulic_tank_pressure
     pressed = min(par.hydraulic_precharge / line, 1.0)
-    gas = par.hydraulic_gas_volume * math.exp(math.log(pressed) / par.hydraulic_gas_exponent)
+    gas = par.hydraulic_gas_volume * exp(log(pressed) / par.hydraulic_gas_exponent)
     rear = filling_of(tank, size_of_rear(par, x), bulk, air)
     supply = filling_of(line, size_of_supply(par, x), bulk, air)
     return Oil(x, 0.0, 0.0, 0.0, rear, supply, 0.0, gas, *NOTHING)

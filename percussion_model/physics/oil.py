@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from percussion_model.physics.elementary import exp, log
 from percussion_model.physics.kernel import inlined
 
 # Pressure of the surroundings, at which fillings and the share of air are told [Pa].
@@ -82,7 +83,7 @@ def drop_for(flow, wide, straight):
 @inlined
 def gas_pressure(precharge, whole, size, exponent):
     """Pressure of the gas of an accumulator that oil has pressed into a part of the whole [Pa]."""
-    return precharge * math.exp(exponent * math.log(whole / size))
+    return precharge * exp(exponent * log(whole / size))
 
 
 class Weights(NamedTuple):
@@ -101,7 +102,7 @@ def weights_of(z, h):
 
     S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430.
     """
-    fades = math.exp(0.5 * z)
+    fades = exp(0.5 * z)
     e, by = fades * fades, h / (z * z * z)
     return Weights(
         fades,
