@@ -22,8 +22,6 @@ from fmu_src.native.motion import (
 )
 from fmu_src.native.notes import add_note, look, set_fault
 from fmu_src.native.outputs import OUTPUT_COUNT, fill_outputs
-from fmu_src.native.solvers import kind_of
-from percussion_model.engine.fault_texts import FIRST_RULE, keys_in
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import (
     fill_values,
@@ -35,16 +33,15 @@ from percussion_model.engine.image import (
 from percussion_model.engine.layout import blow_records, head_records, motion_of, motion_records
 from percussion_model.engine.memory import floats_at, hold, words_at
 from percussion_model.engine.records import MOTION_BYTES, GaugeBar, Kind, Left
+from percussion_model.engine.scene_checks import contradiction, kind_of
 from percussion_model.engine.scene_image import AT, Own
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.records import BLOW, DRIVES, DriveKind, Piston, Status
 from percussion_model.physics.state import LARGEST, MOST
 from percussion_model.scene.bars import bar_length, bar_mass
-from percussion_model.scene.contradictions import TEXTS, Bodies, Rule, find_contradiction
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.parameters import row_of
 from percussion_model.scene.rock_law import POWER, ROCKS, barrier_on, rock_numbers
-from percussion_model.scene.solver_names import BODIES
 from percussion_model.scene.values import SCENE_NUMBERS
 from percussion_model.solvers import plain_code  # noqa: F401  # kernels call functions of scenes
 from percussion_model.solvers.base import MOST_AHEAD
@@ -144,53 +141,6 @@ def _fill_barrier(head, numbers):
     head.time_share, head.energy_share = took / cycle, share
 
 
-Pair = tuple[tuple[int, int], tuple[int, int]]
-NO_VALUE = (-1, 0)
-
-
-def _facts() -> tuple[Pair, ...]:
-    """Of each rule the two values in its text: words, -1 for none, and 1 for choices."""
-    found: list[Pair] = [(NO_VALUE, NO_VALUE)] * (1 + len(TEXTS))
-    for rule, text in TEXTS.items():
-        one, two = NO_VALUE, NO_VALUE
-        for key in reversed(keys_in(text)):
-            one, two = (AT[key.replace(".", "_")], int(bool(row_of(key).choices))), one
-        found[rule] = (one, two)
-    return tuple(found)
-
-
-FACTS = _facts()
-BODIES_OF_SOLVERS = tuple(
-    {"elastic": int(Bodies.ELASTIC), "rigid": int(Bodies.RIGID)}.get(BODIES.get(name) or "", 0)
-    for name in row_of("solver.name").choices
-)
-
-
-@preparing
-def _fact(values, word, is_choice):
-    """A value as a fact: of a choice its place, counted from 1."""
-    if word < 0:
-        return 0.0
-    if is_choice == 1:
-        return values.view(np.int64)[word] + 1.0
-    return values.view(np.float64)[word]
-
-
-@preparing
-def _refuse_contradiction(values, has_rods, is_barrier_given, notes):
-    """Refuse parameters that contradict each other."""
-    v = values[0]
-    bodies = BODIES_OF_SOLVERS[v.solver_name]
-    found = find_contradiction(v, bodies, has_rods, is_barrier_given)
-    rule = found.value
-    if rule == Rule.NOTHING.value:
-        return 0
-    (one, one_is), (two, two_is) = FACTS[rule]
-    facts = np.zeros(4)
-    facts[0], facts[1] = _fact(values, one, one_is), _fact(values, two, two_is)
-    return set_fault(notes, FIRST_RULE + rule - 1, facts)
-
-
 @preparing
 def check(image, notes):
     """Refuse parameters that go together with none other, or with none of this library."""
@@ -205,12 +155,12 @@ def check(image, notes):
 def _check_values(image, values, notes):
     numbers = numbers_at(image, values)
     given = own_numbers(image)[Own.BARRIER_GIVEN] != 0.0
-    fault = _refuse_contradiction(values, has_rods(image), given, notes)
-    if fault > 0:
-        return fault
-    if kind_of(numbers) == 0:
-        return set_fault(notes, Fault.SOLVER.value, np.zeros(4))
     facts = np.zeros(4)
+    fault = contradiction(values, has_rods(image), given, facts)
+    if fault > 0:
+        return set_fault(notes, fault, facts)
+    if kind_of(numbers) == 0:
+        return set_fault(notes, Fault.SOLVER.value, facts)
     fault = kinds.refuse(kind_of(numbers), image, facts.ctypes.data)
     if fault > 0:
         return set_fault(notes, fault, facts)
