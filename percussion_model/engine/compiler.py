@@ -23,7 +23,7 @@ from contextlib import contextmanager, nullcontext
 from importlib.metadata import version
 from pathlib import Path
 
-from percussion_model.engine.platforms import PLATFORMS, this_platform
+from percussion_model.engine.platforms import TARGETS, WASM, this_platform
 from percussion_model.physics.user_cache import cache_folder, can_write, is_clone
 from percussion_model.scene.scene import SceneError
 
@@ -197,7 +197,7 @@ def objects(
     modules : sequence of str
         In which `objects.exported_by` finds entries.
     platforms : sequence of str
-        Of `PLATFORMS`.
+        Of `TARGETS`.
 
     Returns
     -------
@@ -275,7 +275,10 @@ def python() -> str:
 
 
 def _make_one(module: str, platforms: Sequence[str], kept: Path) -> None:
-    """Make the objects of a module, by a process in which numba knows no processor."""
+    """Make the objects of a module, by a process in which numba knows no processor.
+
+    Numba is told to translate otherwise for WASM, which therefore comes alone.
+    """
     folder = _folder_of(module, kept)
     with tempfile.TemporaryDirectory(prefix=".draft-", dir=kept) as work:
         plain = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_DISABLE_JIT": "0"}
@@ -284,7 +287,8 @@ def _make_one(module: str, platforms: Sequence[str], kept: Path) -> None:
             plain["PYTHONPATH"] = str(ROOT)
         out = Path(work) / "objects"
         out.mkdir()
-        translations = kept / f"{module.rpartition('.')[2]}.translations"
+        ending = f".{WASM}" * (WASM in platforms) + ".translations"
+        translations = kept / f"{module.rpartition('.')[2]}{ending}"
         command = [python(), "-m", f"{NAME}.engine.objects"]
         command += [module, str(translations), str(out), *platforms]
         done = subprocess.run(
@@ -314,7 +318,7 @@ def compiler_for(name: str, word: str = "") -> list[str]:
     Parameters
     ----------
     name : str
-        Of `PLATFORMS`.
+        Of `TARGETS`.
     word : str
         What the user calls it.
 
@@ -323,8 +327,8 @@ def compiler_for(name: str, word: str = "") -> list[str]:
     NoCompilerError
         If there is none.
     """
-    if name not in PLATFORMS:
-        raise NoCompilerError(f"no compiler for {name}: known are {', '.join(PLATFORMS)}")
+    if name not in TARGETS:
+        raise NoCompilerError(f"no compiler for {name}: known are {', '.join(TARGETS)}")
     own = ""
     if name == this_platform():
         own = "a C compiler (cc, gcc or clang), or "
@@ -336,7 +340,7 @@ def compiler_for(name: str, word: str = "") -> list[str]:
             f"no compiler for {word or name}: install {own}ziglang: "
             'pip install "percussion_model[native]"'
         )
-    return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
+    return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[name].zig]
 
 
 def link(
@@ -348,7 +352,7 @@ def link(
     Parameters
     ----------
     name : str
-        Of `PLATFORMS`.
+        Of `TARGETS`.
     compiler : sequence of str
         As `compiler_for` gives it.
     sources, parts : Path
@@ -360,7 +364,9 @@ def link(
     given = [*FLAGS, f"-I{HERE}", *flags]
     if any(one.stem.endswith("_avx2") for one in parts):
         given.append("-DHAVE_AVX2_KERNELS")
-    if "windows" not in name:
+    if name == WASM:
+        given.remove("-shared")  # it would need a loader
+    elif "windows" not in name:
         given.append("-fPIC")
     if "darwin" in name:
         given.append(f"-Wl,-install_name,@rpath/{out.name}")

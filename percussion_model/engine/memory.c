@@ -20,24 +20,25 @@
 
 enum { LINE = 64 }; /* of a processor's cache [bytes] */
 
-/* As numba's code sees it: it reads the count and where the numbers are. */
+/* As numba's code sees it, whose counts have eight bytes: it reads the first, and where the numbers
+ * are. */
 typedef struct {
-    size_t count;
-    void (*destroy)(void *data, size_t size, void *info);
+    uint64_t count;
+    void (*destroy)(void *data, uint64_t size, void *info);
     void *info;
     void *data;
-    size_t size;
+    uint64_t size;
     void *allocator;
 } Array;
 
-int64_t native_allocate(int64_t size);
+EXPORTED int64_t native_allocate(int64_t size);
 EXPORTED void native_free(int64_t memory);
 EXPORTED int64_t engine_has_avx2(void);
-void *NRT_Allocate(size_t size);
+void *NRT_Allocate(uint64_t size);
 void NRT_Free(void *data);
-Array *NRT_MemInfo_alloc(size_t size);
-Array *NRT_MemInfo_alloc_aligned(size_t size, unsigned align);
-Array *NRT_MemInfo_alloc_safe_aligned(size_t size, unsigned align);
+Array *NRT_MemInfo_alloc(uint64_t size);
+Array *NRT_MemInfo_alloc_aligned(uint64_t size, unsigned align);
+Array *NRT_MemInfo_alloc_safe_aligned(uint64_t size, unsigned align);
 void NRT_MemInfo_call_dtor(Array *array);
 
 /* Where a memory really begins stands in the word before it. */
@@ -62,12 +63,12 @@ void native_free(int64_t memory) {
 
 int64_t engine_has_avx2(void) { return has_avx2(); }
 
-Array *NRT_MemInfo_alloc_aligned(size_t size, unsigned align) {
+Array *NRT_MemInfo_alloc_aligned(uint64_t size, unsigned align) {
     if (size > SIZE_MAX / 2) {
         return NULL;
     }
     size_t step = align > sizeof(void *) ? align : sizeof(void *);
-    Array *array = malloc(sizeof *array + size + step);
+    Array *array = malloc((size_t)(sizeof *array + size + step));
     if (array == NULL) {
         return NULL;
     }
@@ -76,11 +77,11 @@ Array *NRT_MemInfo_alloc_aligned(size_t size, unsigned align) {
     return array;
 }
 
-Array *NRT_MemInfo_alloc_safe_aligned(size_t size, unsigned align) {
+Array *NRT_MemInfo_alloc_safe_aligned(uint64_t size, unsigned align) {
     return NRT_MemInfo_alloc_aligned(size, align);
 }
 
-Array *NRT_MemInfo_alloc(size_t size) { return NRT_MemInfo_alloc_aligned(size, LINE); }
+Array *NRT_MemInfo_alloc(uint64_t size) { return NRT_MemInfo_alloc_aligned(size, LINE); }
 
 void NRT_MemInfo_call_dtor(Array *array) {
     if (array->destroy != NULL) {
@@ -89,6 +90,6 @@ void NRT_MemInfo_call_dtor(Array *array) {
     free(array);
 }
 
-void *NRT_Allocate(size_t size) { return malloc(size); }
+void *NRT_Allocate(uint64_t size) { return malloc((size_t)size); }
 
 void NRT_Free(void *data) { free(data); }

@@ -26,7 +26,7 @@ from numba.core.cpu import CPUContext
 
 from percussion_model.engine.entries import ENTRIES, SOLVERS
 from percussion_model.engine.orphans import end_with_parent
-from percussion_model.engine.platforms import PLATFORMS
+from percussion_model.engine.platforms import TARGETS, WASM
 from percussion_model.engine.translations import Translations, stamp_of_translations
 from percussion_model.physics import compiling
 
@@ -63,6 +63,7 @@ AVX2 = "+avx2,+bmi,+bmi2,-fma"
 BUILDS = {
     "x86_64": (Build("x86-64", "", "_base"), Build("x86-64", AVX2, "_avx2")),
     "aarch64": (Build("generic", "", "_base"),),
+    WASM: (Build("mvp", "+simd128,+bulk-memory,+mutable-globals,+sign-ext", "_base"),),
 }
 
 
@@ -149,6 +150,19 @@ def _each_by_itself() -> Iterator[None]:
         patch.object(CPUContext, "create_cfunc_wrapper", make_nothing),
     ):
         yield
+
+
+def _leave_functions() -> None:
+    """Let numba optimise no function by itself, for good.
+
+    It would write down where fields of its structures are, for addresses of eight bytes.
+    """
+
+    def lay_out(library: Any, module: Any) -> None:
+        module.data_layout = library._codegen._data_layout
+
+    patch.object(CPUCodeLibrary, "_optimize_functions", lay_out).start()
+    patch.object(CPUCodeLibrary, "_optimize_final_module", lambda _: None).start()
 
 
 def compile_entries(entries: Mapping[str, Exported]) -> str:
@@ -291,8 +305,9 @@ def make_object(text: str, triple: str, build: Build, names: Iterable[str]) -> b
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     machine = llvm.Target.from_triple(triple).create_target_machine(
-        cpu=build.cpu, features=build.features, opt=3, reloc="pic", codemodel="default"
-    )
+        cpu=build.cpu, features=build.features, opt=3, codemodel="default",
+        reloc="static" if triple.startswith(WASM) else "pic",
+    )  # fmt: skip
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = triple, str(machine.target_data)
     kept = set(names)
@@ -325,11 +340,11 @@ def write_object(file: Path, platform: str, build: Build, names: Iterable[str]) 
     file : Path
         With what `compile_entries` gives.
     platform : str
-        Of `PLATFORMS`.
+        Of `TARGETS`.
     build, names
         As of `make_object`.
     """
-    code = make_object(file.read_text(), PLATFORMS[platform].triple, build, names)
+    code = make_object(file.read_text(), TARGETS[platform].triple, build, names)
     (file.parent / f"{platform}{build.suffix}.o").write_bytes(code)
 
 
@@ -343,8 +358,11 @@ def main(module: str, kept: str, folder: str, *platforms: str) -> None:
         File of the translations of its kernels (`Translations`).
     folder : str
     *platforms : str
+        Of `TARGETS`; WASM, if at all, alone.
     """
     gc.disable()  # it would take a tenth of the time, and find nothing
+    if WASM in platforms:
+        _leave_functions()
     entries = exported_by(module)
     translations = Translations(Path(kept), stamp_of_translations(module))
     text = Path(folder) / "entries.ll"

@@ -33,6 +33,10 @@ PLATFORMS = {
     "aarch64-darwin": Platform("arm64-apple-macosx11.0", "aarch64-macos.11.0", ".dylib"),
 }
 
+# What a browser runs, by its name here. Python runs on none such: no wheel or FMU is for it.
+WASM = "wasm32"
+TARGETS = PLATFORMS | {WASM: Platform("wasm32-unknown-unknown", "wasm32-wasi-musl", ".wasm")}
+
 
 def this_platform() -> str:
     """Name of the platform that this is."""

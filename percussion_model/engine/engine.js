@@ -1,0 +1,443 @@
+// The engine for pages: scenes, and motions of them (`python -m percussion_model.engine.wasm`).
+//
+// A scene is { values: {key: value}, piston, bit, rods } as those of `table.presets`: values that
+// are not the default, in SI units; sections from top to bottom, each [length, area, Young's
+// modulus, density]. Errors are those of the Python package, in its words.
+
+const WORD = 8, FACTS = 4, SAMPLES = 512, EVENTS = 1024, BLOWS = 64, ADVANCE = 0, COMMIT = 1;
+
+export class EngineError extends Error {}
+
+// A function of WebAssembly whose whole numbers, most of them addresses, are BigInt there.
+function plain(code, form) {
+  const [result, kinds] = form.split(":");
+  return (...given) => {
+    const found = code(...given.map((one, k) => (kinds[k] === "w" ? BigInt(one) : one)));
+    return result === "w" ? Number(found) : found;
+  };
+}
+
+export class Engine {
+  // source: bytes of engine.wasm, or a Response with them; table: content of table.json
+  static async load(source, table) {
+    const bytes = source.arrayBuffer ? await source.arrayBuffer() : source;
+    const { instance } = await WebAssembly.instantiate(bytes, {});
+    instance.exports._initialize?.();
+    return new Engine(instance.exports, table);
+  }
+
+  constructor(code, table) {
+    this.table = table;
+    this.memory = code.memory;
+    this.rows = new Map(table.parameters.map((row) => [row.key, row]));
+    this._allocate = plain(code.native_allocate, "w:w");
+    this.free = plain(code.native_free, ":w");
+    this._check = plain(code.scene_check_base, "w:ww");
+    this._solver = plain(code.scene_solver_base, "w:w");
+    this.entries = {};
+    for (const solver of table.solvers) {
+      this.entries[solver] = {};
+      for (const [name, form] of Object.entries(table.entries)) {
+        this.entries[solver][name] = plain(code[`${solver}_${name}_base`], form);
+      }
+    }
+  }
+
+  // Zeros; the address.
+  allocate(words) {
+    const found = this._allocate(WORD * words);
+    if (found === 0) throw new EngineError(this.table.faults[this.table.fault.memory]);
+    return found;
+  }
+
+  // Views are short-lived: memory that grows leaves them empty.
+  numbers(address, count) {
+    return new Float64Array(this.memory.buffer, address, count);
+  }
+
+  words(address, count) {
+    return new BigInt64Array(this.memory.buffer, address, count);
+  }
+
+  // --- scenes
+
+  value(scene, key) {
+    return scene.values?.[key] ?? this.rows.get(key).default;
+  }
+
+  // Whether a parameter has any influence on a scene.
+  matters(scene, key) {
+    const needs = Object.entries(this.rows.get(key).needs);
+    return needs.every(([need, values]) => values.includes(this.value(scene, need)));
+  }
+
+  // The scene with other values.
+  changed(scene, values) {
+    return { ...scene, values: { ...scene.values, ...values } };
+  }
+
+  // The scene on a rock, for the bit that is named, or for that of the rock's numbers.
+  onRock(scene, rock, bit = scene.bit_name) {
+    return this.changed(scene, this.table.rocks[rock].under[bit ?? ""]);
+  }
+
+  withBit(scene, bit) {
+    return { ...this.changed(scene, this.table.bits[bit].values), bit_name: bit };
+  }
+
+  // All numbers of a scene as the engine takes them, in a BigInt64Array.
+  image(scene) {
+    const { reference } = this.table.presets;
+    const { own, pressed, force, drive, counts: head } = this.table.image;
+    const { piston = reference.piston, bit = reference.bit } = scene;
+    const rods = this.value(scene, "effects.string") ? (scene.rods ?? []) : [];
+    const counts = [piston.length, bit.length, rods.length, ...rods.map((rod) => rod.sections.length)];
+    const parts = [...piston, ...bit, ...rods.flatMap((rod) => rod.sections), ...rods.map((rod) => rod.joint)];
+    const tail = parts.flat(), first = head + rods.length, rows = this.table.parameters;
+    const size = first + rows.length + tail.length, length = Object.keys(own).length;
+    const numbers = new Float64Array(size + length), words = new BigInt64Array(numbers.buffer);
+    counts.forEach((count, k) => (words[k] = BigInt(count)));
+    for (const row of rows) {
+      let value = this.value(scene, row.key);
+      if (row.kind === "choice") value = row.choices.indexOf(value);
+      if (row.whole) words[first + row.word] = BigInt(value);
+      else numbers[first + row.word] = value ?? NaN;
+    }
+    numbers.set(tail, first + rows.length);
+    const law = pressed.find(([choice]) => BigInt(choice) === words[first + drive]);
+    numbers[size + own.pressure] = numbers[first + (law ? law[1] : force)];
+    numbers[size + own.on] = numbers[size + own.area] = 1;
+    numbers[size + own.gauge_place] = -1;
+    numbers[size + own.barrier_given] = scene.values && "effects.barrier" in scene.values ? 1 : 0;
+    return words;
+  }
+
+  // Name of the solver of a scene: "modal", "wave", "rigid"; "" for one that is not here.
+  solver(scene) {
+    return this._withImage(scene, (image) => this._kind(this._solver(image)));
+  }
+
+  // Why a scene cannot be computed, in the words of the package; "" if it can.
+  refuse(scene) {
+    const found = this._outOfBounds(scene);
+    if (found.length) return found.join("\n");
+    return this._withImage(scene, (image, facts) => {
+      let fault = this._check(image, facts);
+      if (fault === 0) {
+        const solver = this._kind(this._solver(image));
+        fault = solver ? this.entries[solver].refuse(image, facts) : this.table.fault.solver;
+      }
+      return fault ? this.faultText(fault, this.numbers(facts, FACTS)) : "";
+    });
+  }
+
+  // A motion of a scene at time zero. gauge: { bar: "piston" or "bit", place: [m] } for `stress`.
+  create(scene, gauge) {
+    const refused = this.refuse(scene);
+    if (refused) throw new EngineError(refused);
+    return new Motion(this, scene, gauge);
+  }
+
+  faultText(fault, facts) {
+    return this.table.faults[fault].replace(/\{(\d)(?::([^{}]*))?\}/g, (_, k, form) =>
+      written(facts[k], form ?? ""));
+  }
+
+  _kind(number) {
+    return this.table.solvers.find((name) => this.table.kinds[name] === number) ?? "";
+  }
+
+  // Give an image and room for facts to a function, for as long as it runs.
+  _withImage(scene, use) {
+    const image = this.image(scene), address = this.allocate(image.length + FACTS);
+    this.words(address, image.length).set(image);
+    try {
+      return use(address, address + WORD * image.length);
+    } finally {
+      this.free(address);
+    }
+  }
+
+  // What is wrong with single values.
+  _outOfBounds(scene) {
+    const found = [], look = (row, key, value) => {
+      if (!allowed(row, value)) found.push(`${key} = ${shown(row, value)}: must be ${row.allowed}`);
+    };
+    for (const [key, value] of Object.entries(scene.values ?? {})) {
+      if (this.rows.has(key)) look(this.rows.get(key), key, value);
+      else found.push(`unknown key ${key}`);
+    }
+    for (const bar of ["piston", "bit"]) {
+      (scene[bar] ?? []).forEach((section, k) => this.table.section.forEach((row, i) =>
+        look(row, `${bar}.sections.${k}.${row.key}`, section[i])));
+    }
+    return found;
+  }
+}
+
+// --- values in words, as Python writes them
+
+function allowed(row, value) {
+  if (value === null) return row.default === null && !row.required;
+  if (row.kind === "flag") return typeof value === "boolean";
+  if (row.kind === "choice") return row.choices.includes(value);
+  if (!Number.isFinite(value) || (row.kind === "whole number" && !Number.isInteger(value))) return false;
+  const low = row.lower === null || value > row.lower || (value === row.lower && !row.lowerOpen);
+  return low && (row.upper === null || value < row.upper || (value === row.upper && !row.upperOpen));
+}
+
+function shown(row, value) {
+  if (typeof value !== "number") return JSON.stringify(value);
+  const unit = ["", "-"].includes(row.unit) ? "" : ` ${row.unit}`;
+  const isWhole = row.kind === "whole number" || row.kind === "choice";
+  return (isWhole && Number.isInteger(value) ? String(value) : repr(value)) + unit;
+}
+
+const exponent = (power) => `e${power < 0 ? "-" : "+"}${String(Math.abs(power)).padStart(2, "0")}`;
+
+// The shortest digits that tell a number from all others.
+function repr(value) {
+  if (!Number.isFinite(value)) return Number.isNaN(value) ? "nan" : value > 0 ? "inf" : "-inf";
+  const [digits, power] = value.toExponential().split("e");
+  if (value !== 0 && (power < -4 || power >= 16)) return digits + exponent(Number(power));
+  const text = value.toFixed(Math.max(0, digits.replace(/[-.]/g, "").length - 1 - power));
+  const sign = Object.is(value, -0) ? "-" : "";
+  return sign + (text.includes(".") ? text : `${text}.0`);
+}
+
+// As the format g, of so many digits.
+function general(value, count) {
+  const [digits, power] = value.toExponential(count - 1).split("e");
+  const short = (text) => (text.includes(".") ? text.replace(/\.?0+$/, "") : text);
+  if (power < -4 || power >= count) return short(digits) + exponent(Number(power));
+  return short(value.toFixed(count - 1 - power));
+}
+
+function written(value, form) {
+  if (form.startsWith("|")) return form.slice(1, -1).split("|")[Math.round(value) - 1];
+  if (form === "d") return String(Math.trunc(value));
+  if (form === "r") return repr(value);
+  return general(value, Number(/^\.(\d+)g$/.exec(form)?.[1] ?? 6));
+}
+
+// --- motions
+
+export class Motion {
+  constructor(engine, scene, gauge) {
+    Object.assign(this, { engine, scene, time: 0, blows: [], recordsEvents: false, _found: [] });
+    const { table } = engine, image = engine.image(scene), place = gauge?.place ?? 0;
+    this.solver = engine.solver(scene);
+    this.entries = engine.entries[this.solver];
+    this._owned = [];
+    this._image = this._own(image.length);
+    engine.words(this._image, image.length).set(image);
+    this.base = this.entries.create(this._image, table.gauge_bars[gauge?.bar ?? "none"], place, 0);
+    if (this.base === 0) {
+      this.free();
+      throw new EngineError(table.faults[table.fault.memory]);
+    }
+    this._owned.push(this.base);
+    const head = (name) => Number(engine.words(this.base, 1 + table.head[name])[table.head[name]]);
+    this.moving = this.base + head("state_at");
+    this._size = head("state_bytes") / WORD;
+    this._counts = [head("blow_count_at"), head("event_count_at")];
+    this._copy = this._own(this._size);
+    this._ahead = this._own(this._size);
+    this._blows = this._own((BLOWS * table.bytes.blow) / WORD);
+    this._events = this._own((EVENTS * table.bytes.event) / WORD);
+    this._reading = this._own(table.bytes.reading / WORD);
+    this._times = this._own(SAMPLES);
+    this._rows = this._own(SAMPLES * table.columns.sample.length);
+    this._done = this._own(1);
+  }
+
+  // In the order of time; none where `recordsEvents` was not set before.
+  get events() {
+    return this._found.sort((one, other) => one.time - other.time);
+  }
+
+  _own(words) {
+    this._owned.push(this.engine.allocate(words));
+    return this._owned.at(-1);
+  }
+
+  // Give the memory back; nothing else may be called afterwards.
+  free() {
+    this._owned.splice(0).forEach((address) => this.engine.free(address));
+  }
+
+  // Advance to a time [s].
+  runUntil(t) {
+    this._mayGoTo(t);
+    this._advance(t);
+    this.time = t;
+    return this;
+  }
+
+  // Advance until so many more blows have ended, or to a time [s].
+  runBlows(count, t) {
+    this._mayGoTo(t);
+    while (count > 0) {
+      let { status, blows } = this._run(this.moving, ADVANCE, t, Math.min(count, BLOWS));
+      if (status === 0 && blows < count) {
+        const ahead = this._findBlow(t);
+        if (ahead === null) break;
+        blows += ahead;
+      }
+      count -= blows;
+    }
+    const reached = count > 0 ? t : this.entries.state_time(this.base, this.moving);
+    this.time = Math.max(this.time, reached);
+    return this;
+  }
+
+  // Advance through rising times, and read at each: columns by name, of `table.columns.sample`.
+  sample(times) {
+    const { engine } = this, columns = engine.table.columns.sample, width = columns.length;
+    const rows = new Float64Array(times.length * width);
+    for (let done = 0; done < times.length; ) {
+      this.runUntil(times[done]);
+      const count = Math.min(times.length - done, SAMPLES);
+      engine.numbers(this._times, count).set(times.slice(done, done + count));
+      const status = this.entries.sample(
+        this.base, this.moving, this._copy, 1, this._times, count, this._reading, this._rows,
+        this._blows, BLOWS, this._events, EVENTS, this.recordsEvents ? 1 : 0, this._done);
+      this._take(status, this.moving);
+      const filled = Number(engine.words(this._done, 1)[0]);
+      rows.set(engine.numbers(this._rows, filled * width), done * width);
+      done += filled;
+    }
+    if (times.length) this.runUntil(times.at(-1));
+    const column = (k) => Float64Array.from(times, (t, i) => (k === 0 ? t : rows[i * width + k]));
+    return Object.fromEntries(columns.map(({ name }, k) => [name, column(k)]));
+  }
+
+  // Advance through rising times: stress at the gauge at each [Pa].
+  stress(times) {
+    return Float64Array.from(times, (t) => this.entries.stress(this.base, this._seen(t)));
+  }
+
+  // Advance to a time: elastic force [N] and velocity [m/s] of each cell, at places of their middle
+  // from the top [m], by the names of elastic bars.
+  fields(t) {
+    const at = this._seen(t), found = {};
+    for (const bar of this._bars()) {
+      const number = this.engine.table.gauge_bars[bar], { masses, lengths } = this._cells(bar, number);
+      const n = lengths.length, form = this.entries.shape_form(this.base, at, number);
+      const modes = this.entries.shapes(this._image, number, form, 0);
+      const room = this.engine.allocate(n * (3 + 2 * modes)), made = room + 3 * n * WORD;
+      this.engine.numbers(room, n).set(masses);
+      this.entries.shapes(this._image, number, form, made);
+      const [force, velocity] = [room + n * WORD, room + 2 * n * WORD];
+      this.entries.fields(this.base, at, number, room, made, modes, n, force, velocity);
+      let top = 0;
+      const place = Float64Array.from(lengths, (length) => (top += length) - 0.5 * length);
+      const taken = (address) => this.engine.numbers(address, n).slice();
+      found[bar] = { place, force: taken(force), velocity: taken(velocity) };
+      this.engine.free(room);
+    }
+    return found;
+  }
+
+  // Change inputs at the next grid point, by the keys of `table.inputs` [SI].
+  set(values) {
+    let t = this.entries.grid_point_after(this.base, this.moving, this.time);
+    for (let reached = -Infinity; t > reached; ) { // a step that is cut moves the grid
+      this._advance(t);
+      reached = t;
+      t = this.entries.grid_point_after(this.base, this.moving, this.time);
+    }
+    while (this._run(this.moving, COMMIT, t, BLOWS).status !== 0);
+    for (const [key, value] of Object.entries(values)) {
+      const word = this.engine.table.inputs[key].words[this.solver];
+      this.engine.numbers(this.moving + this.engine.table.bytes.record, word + 1)[word] = value;
+    }
+    return this;
+  }
+
+  // Elastic bars with cells; rods are left out.
+  _bars() {
+    if (this.solver === "rigid") return [];
+    return this.engine.value(this.scene, "piston.model") === "elastic" ? ["piston", "bit"] : ["bit"];
+  }
+
+  _cells(bar, number) {
+    const sections = this.scene[bar] ?? this.engine.table.presets.reference[bar];
+    const n = this.entries.cells(this._image, number, 0, 0), room = this.engine.allocate(sections.length + n);
+    const at = room + sections.length * WORD;
+    this.entries.cells(this._image, number, room, at);
+    const counts = Array.from(this.engine.words(room, sections.length), Number);
+    const masses = this.engine.numbers(at, n).slice();
+    this.engine.free(room);
+    const lengths = counts.flatMap((count, k) => Array(count).fill(sections[k][0] / count));
+    return { masses, lengths };
+  }
+
+  _mayGoTo(t) {
+    if (!Number.isFinite(t)) throw new EngineError(`t = ${repr(t)}: must be a finite time in s`);
+    if (t >= this.time) return;
+    throw new EngineError(`t = ${repr(t)} s: lies before the present time ${repr(this.time)} s`);
+  }
+
+  _advance(t) {
+    do {
+      while (this._run(this.moving, ADVANCE, t, BLOWS).status !== 0);
+    } while (this._findBlow(t) !== null);
+  }
+
+  // Address of the state at a time, read.
+  _seen(t) {
+    this.runUntil(t);
+    t = Math.max(t, this.entries.state_time(this.base, this.moving));
+    this.entries.read(this.base, this.moving, this._copy, t, this._reading, 0);
+    return this.solver === "wave" ? this.moving : this._copy; // reading leaves waves alone
+  }
+
+  // Do what is pending at a time if it ends before, as at a blow; blows that ended, null: nothing.
+  _findBlow(t) {
+    const end = this.entries.time_of_blow(this.base, this.moving), { engine, _size: size } = this;
+    if (!(end > t)) return null;
+    const copy = (from, to) => engine.words(to, size).set(engine.words(from, size));
+    copy(this.moving, this._ahead);
+    const status = this._call(this._ahead, ADVANCE, end, 1);
+    const before = this.entries.state_time(this.base, this.moving);
+    const now = this.entries.state_time(this.base, this._ahead);
+    if (now > t) return null;
+    copy(this._ahead, this.moving);
+    const { blows } = this._take(status, this.moving);
+    return now > before || blows > 0 ? blows : null;
+  }
+
+  _call(moving, task, t, room) {
+    return this.entries.run(this.base, moving, task, t, this._blows, room, this._events, EVENTS,
+      this.recordsEvents ? 1 : 0);
+  }
+
+  _run(moving, task, t, room) {
+    return this._take(this._call(moving, task, t, room), moving);
+  }
+
+  // Keep the rows of a call.
+  _take(status, moving) {
+    const { table } = this.engine, begin = table.bytes.record;
+    const record = this.engine.words(moving + begin, this._size - begin / WORD);
+    const [blows, events] = this._counts.map((word) => Number(record[word]));
+    this._list(this._blows, blows, table.columns.blow, table.bytes.blow, this.blows);
+    this._list(this._events, events, table.columns.event, table.bytes.event, this._found);
+    const { not_finite: notFinite, stopped } = table.fault, names = table.status;
+    const isFull = status === names.blows_full || status === names.events_full;
+    if (status === 0 || (isFull && blows + events > 0)) return { status, blows };
+    const fault = status === names.not_finite ? notFinite : stopped;
+    const time = this.entries.state_time(this.base, moving);
+    throw new EngineError(this.engine.faultText(fault, [time]));
+  }
+
+  _list(address, count, columns, bytes, list) {
+    for (let k = 0; k < count; k++) {
+      const numbers = this.engine.numbers(address + k * bytes, bytes / WORD);
+      const words = this.engine.words(address + k * bytes, bytes / WORD);
+      list.push(Object.fromEntries(columns.map(({ name, word, whole }) =>
+        [name, whole ? Number(words[word]) : numbers[word]])));
+    }
+  }
+}
