@@ -49,6 +49,12 @@ const works = {
     }
     return found;
   },
+  settle(job) {
+    const motion = engine.create(scene(job));
+    const found = motion.settle(...job.asked), blows = motion.blows.length, { time } = motion;
+    motion.free();
+    return { ...found, blows, time };
+  },
   fault: (job) => engine.faultText(job.number, job.facts),
 };
 

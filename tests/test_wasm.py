@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, SceneError, Simulation
+from percussion_model.analysis.stationary import settled
 from percussion_model.engine import wasm
 from percussion_model.engine.compiler import NoCompilerError
 from percussion_model.engine.fault_texts import fault_text, faults
@@ -209,7 +211,34 @@ def test_samples_fields_and_stress(in_node):
     assert int(found["stress"]) == int(bits([stress_at(Scene(), 0.1, times[-1])])[0])
 
 
+SETTLING = (
+    ("reference", {}, (1e-4, 400, 0.0)),
+    ("aperiodic", {}, (1e-4, 400, 0.02)),
+    ("dth4", {"rotation.stall_torque": 2000.0}, (1e-4, 400, 0.0)),
+    ("reference", {"feed.force": 0.0, "drive.force": 10.0}, (1e-4, 400, 0.0)),
+)
+NAMES = {"rate": "rate_of_penetration", "error": "settling_error", "multiplier": "multiplier"}
+
+
+def test_blows_settle_as_in_python(in_node):
+    jobs = [{"preset": a, "values": b, "asked": c} for a, b, c in SETTLING]
+    kinds = []
+    for found, (preset, values, asked) in zip(
+        in_node(*({"work": "settle"} | job for job in jobs)), SETTLING, strict=True
+    ):
+        tolerance, most, scatter = asked
+        wanted = settled(scene_of(preset, **values), tolerance, most, scatter=scatter)
+        kinds.append(found["kind"])
+        assert (found["kind"], found["order"]) == (wanted.kind, wanted.order)
+        assert (found["blows"], found["time"]) == (len(wanted.blows), wanted.duration)
+        for name, own in NAMES.items():
+            value, number = found[name], getattr(wanted, own)
+            value = math.nan if value is None else value  # JSON has no such number
+            assert value == pytest.approx(number, rel=1e-9, nan_ok=True)
+    assert set(kinds) == {"periodic", "aperiodic", "stalled"}
+
+
 def test_memory_is_given_back(in_node):
-    job = {"work": "sizes", "preset": "reference", "values": {"solver.cells": 20}, "times": 200}
+    job = {"work": "sizes", "preset": "reference", "values": {"solver.cells": 5}, "times": 200}
     (sizes,) = in_node(job)
     assert sizes[-1] == sizes[1]

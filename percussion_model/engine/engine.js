@@ -6,6 +6,9 @@
 
 const WORD = 8, FACTS = 4, SAMPLES = 512, EVENTS = 1024, BLOWS = 64, ADVANCE = 0, COMMIT = 1;
 
+// As in analysis/stationary.py, which tells why.
+const FEWEST_SCATTERED = 100, NEXT_CHECK = 1.25, SETTLING_SHARE = 0.2, MOTOR_SETTLES = 10;
+
 export class EngineError extends Error {}
 
 // A function of WebAssembly whose whole numbers, most of them addresses, are BigInt there.
@@ -220,6 +223,25 @@ function written(value, form) {
   return general(value, Number(/^\.(\d+)g$/.exec(form)?.[1] ?? 6));
 }
 
+// Rate of penetration over blows and its standard error [m/s], as simulation/rate.py.
+export function rateOf(blows) {
+  const sum = (values) => values.reduce((total, one) => total + one, 0), n = blows.length;
+  if (n < 3) return { rate: NaN, error: NaN };
+  const advances = blows.map((one) => (Math.abs(one.hole_advance) < 1e-13 ? 0 : one.hole_advance));
+  const time = sum(blows.map((one) => one.period)), rate = sum(advances) / time, sums = [0];
+  blows.forEach((one, k) => sums.push(sums[k] + advances[k] - rate * one.period));
+  const scattered = (length) => [
+    sum(sums.slice(length).map((one, k) => (one - sums[k]) ** 2)) / (n + 1 - length),
+    length * (1 - length / n),
+  ];
+  const [short, walk] = scattered(1);
+  if (n < 20) return { rate, error: Math.sqrt((short / walk) * n) / time };
+  const [long, longWalk] = scattered(Math.max(Math.trunc(n / 4), 2));
+  const a = Math.max((long - short) / (longWalk - walk), 0), b = short - a * walk;
+  const variance = b < 0 ? (long / longWalk) * n : a * n + b;
+  return { rate, error: Math.sqrt(variance) / time };
+}
+
 // --- motions
 
 export class Motion {
@@ -339,6 +361,59 @@ export class Motion {
     return found;
   }
 
+  // Run from time zero until blows repeat within a tolerance, or so many have ended, or their rate is
+  // known to a scatter (0: never): { kind, order, rate, error, multiplier } as of `settled` in Python.
+  settle(tolerance = 1e-4, mostBlows = 400, scatter = 0) {
+    return this.settling(tolerance, mostBlows, scatter, Infinity).next().value;
+  }
+
+  // The same as a generator, which yields after each piece of time [s], and returns what `settle` does.
+  *settling(tolerance, mostBlows, scatter, piece) {
+    const { engine } = this, { request: place, verdicts, bytes, columns, status: names } = engine.table;
+    const value = (key) => engine.value(this.scene, key);
+    if (value("piston.model") === "absent") {
+      throw new EngineError('piston.model = "absent": a bit alone has no blows that could settle');
+    }
+    const stalls = value("effects.rotation") && value("rotation.stall_torque") > 0;
+    const width = bytes.blow / WORD, size = Object.keys(place).length;
+    const asked = engine.allocate(size + mostBlows * width), rows = asked + size * WORD;
+    const numbers = () => engine.numbers(asked, size), words = () => engine.words(asked, size);
+    const [first, given] = [numbers(), words()];
+    first[place.tolerance] = tolerance;
+    first[place.not_before] = stalls ? MOTOR_SETTLES * value("rotation.response") : 0;
+    first[place.enough] = scatter ? FEWEST_SCATTERED : Infinity;
+    given[place.most] = BigInt(mostBlows);
+    try {
+      for (;;) {
+        numbers()[place.until] = this.time + piece;
+        const status = this.entries.settle(this.base, this.moving, asked, rows, mostBlows);
+        if (status !== names.done) this._fail(status, this.moving);
+        const found = numbers(), whole = (name) => Number(words()[place[name]]), listed = this.blows.length;
+        this.time = found[place.time];
+        this._list(rows + listed * bytes.blow, whole("blows") - listed, columns.blow, bytes.blow, this.blows);
+        const verdict = whole("verdict");
+        if (verdict === verdicts.open) {
+          yield;
+          continue;
+        }
+        const none = { order: 0, rate: NaN, error: NaN, multiplier: NaN };
+        if (verdict === verdicts.stalled) return { kind: "stalled", ...none };
+        if (verdict === verdicts.periodic) {
+          const [rate, error, multiplier] = ["rate", "error", "multiplier"].map((name) => found[place[name]]);
+          return { kind: "periodic", order: whole("order"), rate, error, multiplier };
+        }
+        const known = rateOf(this.blows.slice(Math.trunc(SETTLING_SHARE * this.blows.length)));
+        if (this.blows.length >= mostBlows || known.error <= scatter * Math.abs(known.rate)) {
+          return { kind: "aperiodic", ...none, ...known };
+        }
+        words()[place.verdict] = 0n;
+        found[place.enough] = NEXT_CHECK * this.blows.length;
+      }
+    } finally {
+      engine.free(asked);
+    }
+  }
+
   // Change inputs at the next grid point, by the keys of `table.inputs` [SI].
   set(values) {
     let t = this.entries.grid_point_after(this.base, this.moving, this.time);
@@ -424,12 +499,16 @@ export class Motion {
     const [blows, events] = this._counts.map((word) => Number(record[word]));
     this._list(this._blows, blows, table.columns.blow, table.bytes.blow, this.blows);
     this._list(this._events, events, table.columns.event, table.bytes.event, this._found);
-    const { not_finite: notFinite, stopped } = table.fault, names = table.status;
+    const names = table.status;
     const isFull = status === names.blows_full || status === names.events_full;
     if (status === 0 || (isFull && blows + events > 0)) return { status, blows };
-    const fault = status === names.not_finite ? notFinite : stopped;
-    const time = this.entries.state_time(this.base, moving);
-    throw new EngineError(this.engine.faultText(fault, [time]));
+    return this._fail(status, moving);
+  }
+
+  _fail(status, moving) {
+    const { status: names, fault } = this.engine.table;
+    const number = status === names.not_finite ? fault.not_finite : fault.stopped;
+    throw new EngineError(this.engine.faultText(number, [this.entries.state_time(this.base, moving)]));
   }
 
   _list(address, count, columns, bytes, list) {

@@ -48,8 +48,8 @@ def write(folder: Path, report: compiler.Report | None = None) -> list[Path]:
     code = engine_file(report)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".draft-", dir=folder) as work:
-        shutil.copy(code, Path(work) / "engine.wasm")
-        shutil.copy(SCRIPT, Path(work) / SCRIPT.name)
+        shutil.copyfile(code, Path(work) / "engine.wasm")
+        shutil.copyfile(SCRIPT, Path(work) / SCRIPT.name)
         text = json.dumps(table(), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
         (Path(work) / "table.json").write_text(text, encoding="utf-8")
         return [file.replace(folder / file.name) for file in sorted(Path(work).iterdir())]

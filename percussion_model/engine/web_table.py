@@ -28,6 +28,7 @@ from percussion_model.physics.records import (
     Mode,
     Status,
 )
+from percussion_model.physics.settling import REQUEST, Verdict
 from percussion_model.scene.bar_groups import Rod, Section
 from percussion_model.scene.bits import bit, bit_of, bits
 from percussion_model.scene.hammers import CHAMBERS, hammer, hammers, with_chambers
@@ -126,6 +127,8 @@ def table() -> dict[str, Any]:
         "faults": faults(),
         "fault": {one.name.lower(): int(one) for one in Fault},
         "status": {one.name.lower(): int(one) for one in Status},
+        "request": words_of(REQUEST),
+        "verdicts": {one.name.lower(): int(one) for one in Verdict},
         "modes": {one.value: one.name for one in Mode},
         "event_kinds": {one.value: one.name.lower() for one in EventKind},
         "presets": {name: scene_as_json(scene) for name, scene in scenes().items()},
