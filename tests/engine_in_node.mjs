@@ -1,5 +1,7 @@
-// Does jobs with the engine of a folder: `node engine_in_node.mjs FOLDER`, jobs as JSON on stdin.
+// Does jobs with the engine of a folder: `node engine_in_node.mjs FOLDER`, lists of them on lines of
+// stdin, what they give on lines of stdout, both as JSON.
 import { readFileSync } from "node:fs";
+import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
 
 const folder = process.argv[2];
@@ -58,5 +60,6 @@ const works = {
   fault: (job) => engine.faultText(job.number, job.facts),
 };
 
-const jobs = JSON.parse(readFileSync(0, "utf8"));
-process.stdout.write(JSON.stringify(jobs.map((job) => works[job.work](job))));
+for await (const line of createInterface({ input: process.stdin })) {
+  console.log(JSON.stringify(JSON.parse(line).map((job) => works[job.work](job))));
+}

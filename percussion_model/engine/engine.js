@@ -74,6 +74,11 @@ export class Engine {
     return needs.every(([need, values]) => values.includes(this.value(scene, need)));
   }
 
+  // Bars between piston and bit, where they are on.
+  rods(scene) {
+    return this.value(scene, "effects.string") ? (scene.rods ?? []) : [];
+  }
+
   // The scene with other values.
   changed(scene, values) {
     return { ...scene, values: { ...scene.values, ...values } };
@@ -93,7 +98,7 @@ export class Engine {
     const { reference } = this.table.presets;
     const { own, pressed, force, drive, counts: head } = this.table.image;
     const { piston = reference.piston, bit = reference.bit } = scene;
-    const rods = this.value(scene, "effects.string") ? (scene.rods ?? []) : [];
+    const rods = this.rods(scene);
     const counts = [piston.length, bit.length, rods.length, ...rods.map((rod) => rod.sections.length)];
     const parts = [...piston, ...bit, ...rods.flatMap((rod) => rod.sections), ...rods.map((rod) => rod.joint)];
     const tail = parts.flat(), first = head + rods.length, rows = this.table.parameters;
@@ -246,30 +251,36 @@ export function rateOf(blows) {
 
 export class Motion {
   constructor(engine, scene, gauge) {
-    Object.assign(this, { engine, scene, time: 0, blows: [], recordsEvents: false, _found: [] });
-    const { table } = engine, image = engine.image(scene), place = gauge?.place ?? 0;
+    Object.assign(this, { engine, scene, time: 0, blows: [], recordsEvents: false, _found: [], _owned: [] });
     this.solver = engine.solver(scene);
     this.entries = engine.entries[this.solver];
-    this._owned = [];
+    try {
+      this._make(engine.image(scene), gauge);
+    } catch (error) {
+      this.free();
+      throw error;
+    }
+  }
+
+  _make(image, gauge) {
+    const { engine } = this, { gauge_bars: bars, head: words, bytes, columns } = engine.table;
+    const bar = this._bars().find(([name]) => name === gauge?.bar)?.[1] ?? bars.none;
     this._image = this._own(image.length);
     engine.words(this._image, image.length).set(image);
-    this.base = this.entries.create(this._image, table.gauge_bars[gauge?.bar ?? "none"], place, 0);
-    if (this.base === 0) {
-      this.free();
-      throw new EngineError(table.faults[table.fault.memory]);
-    }
+    this.base = this.entries.create(this._image, bar, gauge?.place ?? 0, 0);
+    if (this.base === 0) throw new EngineError(engine.faultText(engine.table.fault.memory, []));
     this._owned.push(this.base);
-    const head = (name) => Number(engine.words(this.base, 1 + table.head[name])[table.head[name]]);
+    const head = (name) => Number(engine.words(this.base, 1 + words[name])[words[name]]);
     this.moving = this.base + head("state_at");
     this._size = head("state_bytes") / WORD;
     this._counts = [head("blow_count_at"), head("event_count_at")];
     this._copy = this._own(this._size);
     this._ahead = this._own(this._size);
-    this._blows = this._own((BLOWS * table.bytes.blow) / WORD);
-    this._events = this._own((EVENTS * table.bytes.event) / WORD);
-    this._reading = this._own(table.bytes.reading / WORD);
+    this._blows = this._own((BLOWS * bytes.blow) / WORD);
+    this._events = this._own((EVENTS * bytes.event) / WORD);
+    this._reading = this._own(bytes.reading / WORD);
     this._times = this._own(SAMPLES);
-    this._rows = this._own(SAMPLES * table.columns.sample.length);
+    this._rows = this._own(SAMPLES * columns.sample.length);
     this._done = this._own(1);
   }
 
@@ -340,23 +351,26 @@ export class Motion {
   }
 
   // Advance to a time: elastic force [N] and velocity [m/s] of each cell, at places of their middle
-  // from the top [m], by the names of elastic bars.
+  // from the top [m], by the names of elastic bars: "piston", "rod 1", ..., "bit".
   fields(t) {
-    const at = this._seen(t), found = {};
-    for (const bar of this._bars()) {
-      const number = this.engine.table.gauge_bars[bar], { masses, lengths } = this._cells(bar, number);
-      const n = lengths.length, form = this.entries.shape_form(this.base, at, number);
-      const modes = this.entries.shapes(this._image, number, form, 0);
-      const room = this.engine.allocate(n * (3 + 2 * modes)), made = room + 3 * n * WORD;
-      this.engine.numbers(room, n).set(masses);
-      this.entries.shapes(this._image, number, form, made);
-      const [force, velocity] = [room + n * WORD, room + 2 * n * WORD];
-      this.entries.fields(this.base, at, number, room, made, modes, n, force, velocity);
+    const at = this._seen(t), { engine } = this, found = {};
+    for (const [name, bar, sections] of this._bars()) {
+      const n = this.entries.cells(this._image, bar, 0, 0);
+      const form = this.entries.shape_form(this.base, at, bar);
+      const modes = this.entries.shapes(this._image, bar, form, 0);
+      const room = engine.allocate(sections.length + n * (3 + 2 * modes));
+      const masses = room + sections.length * WORD, force = masses + n * WORD, velocity = force + n * WORD;
+      const made = velocity + n * WORD;
+      this.entries.cells(this._image, bar, room, masses);
+      this.entries.shapes(this._image, bar, form, made);
+      this.entries.fields(this.base, at, bar, masses, made, modes, n, force, velocity);
+      const counts = Array.from(engine.words(room, sections.length), Number);
+      const lengths = counts.flatMap((count, k) => Array(count).fill(sections[k][0] / count));
       let top = 0;
       const place = Float64Array.from(lengths, (length) => (top += length) - 0.5 * length);
-      const taken = (address) => this.engine.numbers(address, n).slice();
-      found[bar] = { place, force: taken(force), velocity: taken(velocity) };
-      this.engine.free(room);
+      const [forces, velocities] = [force, velocity].map((from) => engine.numbers(from, n).slice());
+      found[name] = { place, force: forces, velocity: velocities };
+      engine.free(room);
     }
     return found;
   }
@@ -430,22 +444,16 @@ export class Motion {
     return this;
   }
 
-  // Elastic bars with cells; rods are left out.
+  // Elastic bars from top to bottom: name, number and sections.
   _bars() {
     if (this.solver === "rigid") return [];
-    return this.engine.value(this.scene, "piston.model") === "elastic" ? ["piston", "bit"] : ["bit"];
-  }
-
-  _cells(bar, number) {
-    const sections = this.scene[bar] ?? this.engine.table.presets.reference[bar];
-    const n = this.entries.cells(this._image, number, 0, 0), room = this.engine.allocate(sections.length + n);
-    const at = room + sections.length * WORD;
-    this.entries.cells(this._image, number, room, at);
-    const counts = Array.from(this.engine.words(room, sections.length), Number);
-    const masses = this.engine.numbers(at, n).slice();
-    this.engine.free(room);
-    const lengths = counts.flatMap((count, k) => Array(count).fill(sections[k][0] / count));
-    return { masses, lengths };
+    const { engine, scene } = this, { gauge_bars: numbers, presets: { reference } } = engine.table;
+    const isElastic = engine.value(scene, "piston.model") === "elastic";
+    return [
+      ...(isElastic ? [["piston", numbers.piston, scene.piston ?? reference.piston]] : []),
+      ...engine.rods(scene).map((rod, k) => [`rod ${k + 1}`, numbers.rod + k, rod.sections]),
+      ["bit", numbers.bit, scene.bit ?? reference.bit],
+    ];
   }
 
   _mayGoTo(t) {
