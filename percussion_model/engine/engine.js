@@ -8,6 +8,7 @@ const WORD = 8, FACTS = 4, SAMPLES = 512, EVENTS = 1024, BLOWS = 64, ADVANCE = 0
 
 // As in analysis/stationary.py, which tells why.
 const FEWEST_SCATTERED = 100, NEXT_CHECK = 1.25, SETTLING_SHARE = 0.2, MOTOR_SETTLES = 10;
+const STRETCHES = [1 / 8, 1 / 4, 1 / 2];
 
 export class EngineError extends Error {}
 
@@ -228,7 +229,7 @@ function written(value, form) {
   return general(value, Number(/^\.(\d+)g$/.exec(form)?.[1] ?? 6));
 }
 
-// Rate of penetration over blows and its standard error [m/s], as simulation/rate.py.
+// Rate of penetration over blows and its standard error [m/s], as `rate_so_far` of these.
 export function rateOf(blows) {
   const sum = (values) => values.reduce((total, one) => total + one, 0), n = blows.length;
   if (n < 3) return { rate: NaN, error: NaN };
@@ -241,10 +242,12 @@ export function rateOf(blows) {
   ];
   const [short, walk] = scattered(1);
   if (n < 20) return { rate, error: Math.sqrt((short / walk) * n) / time };
-  const [long, longWalk] = scattered(Math.max(Math.trunc(n / 4), 2));
-  const a = Math.max((long - short) / (longWalk - walk), 0), b = short - a * walk;
-  const variance = b < 0 ? (long / longWalk) * n : a * n + b;
-  return { rate, error: Math.sqrt(variance) / time };
+  const variances = STRETCHES.map((share) => {
+    const [long, longWalk] = scattered(Math.max(Math.trunc(share * n), 2));
+    const a = Math.max((long - short) / (longWalk - walk), 0), b = short - a * walk;
+    return b < 0 ? (long / longWalk) * n : a * n + b;
+  });
+  return { rate, error: Math.sqrt(Math.max(...variances)) / time };
 }
 
 // --- motions
