@@ -156,7 +156,7 @@ def test_random_settings(in_node):
 
 def test_what_is_refused_is_told_in_the_same_words(in_node):
     cases = (
-        {"feed.force": -1.0, "rock.buttons": 0},
+        {"feed.force": -1.0, "rock.buttons": 0, "drive.force": None},
         {"effects.rock": "clay", "rock.unloading_ratio": 1e-7},
         {"solver.cells": 100_000},
         {"solver.accuracy": 0.01, "solver.cells": 30},

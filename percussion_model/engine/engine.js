@@ -117,7 +117,7 @@ export class Engine {
     numbers[size + own.pressure] = numbers[first + (law ? law[1] : force)];
     numbers[size + own.on] = numbers[size + own.area] = 1;
     numbers[size + own.gauge_place] = -1;
-    numbers[size + own.barrier_given] = scene.values && "effects.barrier" in scene.values ? 1 : 0;
+    numbers[size + own.barrier_given] = scene.values?.["effects.barrier"] == null ? 0 : 1;
     return words;
   }
 
@@ -187,7 +187,7 @@ export class Engine {
 // --- values in words, as Python writes them
 
 function allowed(row, value) {
-  if (value === null) return row.default === null && !row.required;
+  if (value === null) return !row.required; // as the default
   if (row.kind === "flag") return typeof value === "boolean";
   if (row.kind === "choice") return row.choices.includes(value);
   if (!Number.isFinite(value) || (row.kind === "whole number" && !Number.isInteger(value))) return false;
@@ -267,7 +267,12 @@ export class Motion {
 
   _make(image, gauge) {
     const { engine } = this, { gauge_bars: bars, head: words, bytes, columns } = engine.table;
-    const bar = this._bars().find(([name]) => name === gauge?.bar)?.[1] ?? bars.none;
+    const [, bar, sections] = this._bars().find(([name]) => name === gauge?.bar) ?? [, bars.none, []];
+    const length = sections.reduce((sum, [own]) => sum + own, 0);
+    if (gauge?.place > length && sections.length) {
+      throw new EngineError(engine.faultText(engine.table.fault.gauge, [gauge.place, length, bar]));
+    }
+    this._hasGauge = sections.length > 0;
     this._image = this._own(image.length);
     engine.words(this._image, image.length).set(image);
     this.base = this.entries.create(this._image, bar, gauge?.place ?? 0, 0);
@@ -350,6 +355,7 @@ export class Motion {
 
   // Advance through rising times: stress at the gauge at each [Pa].
   stress(times) {
+    if (!this._hasGauge) throw new EngineError("no gauge is on an elastic bar: create the motion with one");
     return Float64Array.from(times, (t) => this.entries.stress(this.base, this._seen(t)));
   }
 
