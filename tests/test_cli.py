@@ -282,6 +282,7 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
         ),
         (["run", RIGID, "--solver", "my"], "--solver 'my': must be one of 'wave', 'modal',"),
         (["stability", "--share", "7"], "--share '7': must be at most 1; see"),
+        (["stability", "--share", "nan"], "--share 'nan': must be"),
         (["paper", "--out", "a", "--processes", "0"], "--processes '0': must be at least 1; see"),
         (["run", RIGID, "--bogus"], "no such option: --bogus"),
         (["run", RIGID, "other.toml"], "other.toml"),

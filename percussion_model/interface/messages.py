@@ -8,15 +8,9 @@ from typing import Any
 
 from percussion_model.scene.retired import remark
 
-# What pydantic, which reads the options for typer, calls a fault; and what is allowed then.
-_ALLOWED = {
-    "int_parsing": "must be a whole number",
-    "int_from_float": "must be a whole number",
-    "float_parsing": "must be a number",
-    "greater_than_equal": "must be at least {ge:g}",
-    "less_than_equal": "must be at most {le:g}",
-}
-_CHOICE = " is not one of "
+# What typer says that a value is not, and what is allowed then.
+_ALLOWED = {"a valid int": "must be a whole number", "a valid float": "must be a number"}
+_CHOICE = "one of "
 
 
 def wrapped(text: str) -> str:
@@ -40,11 +34,11 @@ def usage_text(error: Any) -> str:
     """
     told = " ".join(error.format_message().split()).rstrip(".")
     told = told[:1].lower() + told[1:]
-    faults = getattr(error.__cause__, "errors", None)
-    if faults is not None:
-        fault = faults()[0]
+    value, _, fault = getattr(error, "message", "").rstrip(".").partition(" is not ")
+    value = value.strip("'").removesuffix(".0")
+    if allowed := _allowed(value, fault, error):
         option = max([*error.param.opts, error.param.name], key=len)
-        told = f"{option} {fault['input']!r}: {_allowed(fault)}"
+        told = f"{option} {value!r}: {allowed}"
     retired = (word for word in told.split() if word.strip("'\".,;:-") == "blow-map")
     told += remark("", "blow-map") if any(retired) else ""
     if error.ctx is not None:
@@ -52,12 +46,13 @@ def usage_text(error: Any) -> str:
     return told
 
 
-def _allowed(fault: Any) -> str:
-    """What is allowed where a value was not."""
-    _, choice, choices = fault["msg"].rstrip(".").partition(_CHOICE)
-    if choice:
-        return f"must be one of {choices}"
-    words = _ALLOWED.get(fault["type"])
-    if words is not None and "," in str(fault["input"]):
-        words += ", with a decimal point"
-    return fault["msg"] if words is None else words.format(**fault.get("ctx", {}))
+def _allowed(value: str, fault: str, error: Any) -> str:
+    """What is allowed where a value was not; nothing of other faults."""
+    if fault.startswith("in the range"):
+        low, high = error.param.type.min, error.param.type.max
+        is_low = low is not None and float(value) < low
+        return f"must be at least {low:g}" if is_low else f"must be at most {high:g}"
+    if fault.startswith(_CHOICE):
+        return f"must be {fault}"
+    words = next((words for start, words in _ALLOWED.items() if fault.startswith(start)), "")
+    return words + (", with a decimal point" if words and "," in value else "")

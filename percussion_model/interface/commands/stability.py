@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -39,6 +40,8 @@ def stability(
     from percussion_model.verification.hard_cases import SOLVERS, run_collection
 
     common.check_outputs(out, json_file)
+    if math.isnan(share):  # which no range keeps out
+        raise common.refusal("--share 'nan': must be a number")
     names = [name.strip() for name in solvers.split(",")]
     common.tell_of_compiling(*(name for name in names if name in SOLVERS))
     claimed = None
