@@ -71,8 +71,8 @@ def outputs() -> str:
         + listed(SAMPLE_COLUMNS),
         "Energy ledger": "`energy` in a summary. [The model, section 8](../model.md) tells how "
         "the entries add up.\n\n" + listed(ENERGY_COLUMNS),
-        "Points of a study": "`points.parquet` and `points.nc` of `percussion study`, beside the "
-        "parameters that vary.\n\n" + listed(study_columns()),
+        "Points of a study": "`points.csv`, `points.nc` and, with pyarrow, `points.parquet` of "
+        "`percussion study`, beside the parameters that vary.\n\n" + listed(study_columns()),
     }
     return OUTPUTS + "".join(f"\n## {head}\n\n{text}\n" for head, text in parts.items())
 

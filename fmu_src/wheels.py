@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,8 +38,11 @@ TAGS = {
 
 
 def zig(name: str) -> list[str]:
-    """Command that links for a platform, and asks for no newer system than its wheel says."""
-    return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
+    """Command that links for a platform, and asks for no newer system than its wheel says.
+
+    A fifth of a library is names that nothing looks for: they are left out.
+    """
+    return [sys.executable, "-m", "ziglang", "cc", "-s", "-target", PLATFORMS[name].zig]
 
 
 def fill(folder: Path, name: str, command: Sequence[str]) -> None:
@@ -56,9 +60,11 @@ def fill(folder: Path, name: str, command: Sequence[str]) -> None:
         file = folder / library.brought_file(solver, name).relative_to(ROOT)
         file.parent.mkdir(parents=True, exist_ok=True)
         library.link_solver(solver, name, command, file)
-    file = folder / fmu_file(name).relative_to(ROOT)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    link_fmus(name, command, file)
+    packed = folder / fmu_file(name).relative_to(ROOT)
+    packed.parent.mkdir(parents=True, exist_ok=True)
+    link_fmus(name, command, packed.with_suffix(""))
+    packed.write_bytes(zlib.compress(packed.with_suffix("").read_bytes(), 9))
+    packed.with_suffix("").unlink()
 
 
 def make_wheel(name: str, command: Sequence[str], out: Path) -> Path:

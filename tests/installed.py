@@ -21,6 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 VERSIONS = ("3.11", "3.12", "3.13")
+EVERYTHING = "all,compile"  # for a wheel that is for any system
 FOLDERS = {"percussion_model": "percussion_model", "fmu_src": "fmu_src",
            "scenarios": "percussion_scenarios"}  # fmt: skip
 # What an environment must not know of the clone, and what is not to be the user's.
@@ -142,7 +143,7 @@ def do_tasks(made: Environment) -> None:
     made.percussion("couple", "systems/FeedControlRigid.ssp", "--duration", "1")
 
 
-def try_python(python: str, wheel: Path, extra: str = "all") -> None:
+def try_python(python: str, wheel: Path, extra: str = EVERYTHING) -> None:
     """Install a wheel for a Python and do all tasks, in a folder that is removed again."""
     with tempfile.TemporaryDirectory(prefix="percussion-") as folder:
         do_tasks(whole_environment(Path(folder), wheel, python, extra))
@@ -164,7 +165,7 @@ def main() -> int:
     """Try each Python; return the number of those that fail."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition(":")[0])
     parser.add_argument("pythons", nargs="*", metavar="PYTHON", help="left out: those found")
-    parser.add_argument("--extra", default="all", help="extra that is installed")
+    parser.add_argument("--extra", default=EVERYTHING, help="extras that are installed")
     words = parser.parse_args()
     failed = 0
     with tempfile.TemporaryDirectory(prefix="percussion-wheel-") as folder:

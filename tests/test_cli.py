@@ -16,7 +16,7 @@ from percussion_model.engine import library
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.commands import common
-from percussion_model.interface.commands.common import print_message
+from percussion_model.interface.commands.common import needs_extra, print_message
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 RIGID = str(SCENARIOS / "rigid.toml")
@@ -259,6 +259,12 @@ def test_bad_scenes_are_one_message_on_stderr(percussion, tmp_path, text, messag
     assert "Traceback" not in err
     assert err.count("\n") == 1
     assert os.listdir(tmp_path) == ["scene.toml"]
+
+
+def test_what_is_missing_is_in_the_extra_that_is_named():
+    for package, extra in (("numba.core", "compile"), ("scipy", "fit"), ("fmpy", "fmu")):
+        told = needs_extra(ImportError(name=package), "fmu")
+        assert told.endswith(f'is missing: pip install "percussion_model[{extra}]"')
 
 
 @pytest.mark.parametrize(

@@ -180,7 +180,7 @@ def test_without_bokeh_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "bokeh.application", None)
     found = CliRunner().invoke(app, ["explore", "--no-browser"])
     assert found.exit_code == 2
-    assert "is missing: pip install 'percussion_model[report]'" in found.stderr
+    assert 'is missing: pip install "percussion_model[report]"' in found.stderr
 
 
 def test_a_bad_scene_is_refused_before_a_page_is_served(tmp_path):

@@ -68,7 +68,7 @@ def test_page_needs_nothing_else(case):
 def test_what_is_missing_for_zoom_is_said(monkeypatch):
     assert report.why_not_interactive() == ""
     monkeypatch.setitem(sys.modules, "percussion_model.interface.plotting.interactive", None)
-    assert "pip install 'percussion_model[report]'" in report.why_not_interactive()
+    assert 'pip install "percussion_model[report]"' in report.why_not_interactive()
 
 
 def test_parts_of_drawings_are_told_apart(case):

@@ -85,8 +85,11 @@ def test_a_study_becomes_tables_and_grids(whole, tmp_path):
     import pandas
     import xarray
 
-    parquet, netcdf = sorted(whole.save(tmp_path / "out"), key=lambda path: path.suffix)[::-1]
+    csv, netcdf, parquet = whole.save(tmp_path / "out")
     frame = pandas.read_parquet(parquet)
+    text = pandas.read_csv(csv).drop(columns="failure")  # which is empty
+    numbers = frame.drop(columns="failure")
+    pandas.testing.assert_frame_equal(text, numbers, check_dtype=False, rtol=1e-15)
     assert frame.equals(whole.to_pandas())
     assert "that of the grid is not estimated" in frame.attrs["errors"]
     with xarray.open_dataset(netcdf) as data:
@@ -99,6 +102,15 @@ def test_a_study_becomes_tables_and_grids(whole, tmp_path):
         assert float(here) == whole.rows["rate_of_penetration"][k]
         (tmp_path / "scene.toml").write_text(data.attrs["scene"])
     assert Scene.from_toml(tmp_path / "scene.toml") == SCENE
+
+
+def test_without_pyarrow_a_study_has_no_parquet_and_says_so(whole, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    names = [path.name for path in whole.save(tmp_path / "out")]
+    assert names == ["points.csv", "points.nc"]
+    over = ["--over", "feed.farce=1"]
+    said = CliRunner().invoke(app, ["study", "rigid", *over, "--out", str(tmp_path / "new")]).stderr
+    assert '"percussion_model[parquet]"' in said
 
 
 def test_a_rate_has_its_error_where_that_shows(whole):
@@ -427,7 +439,7 @@ def test_the_command_writes_tables_and_tells_what_it_found(tmp_path):
     answer = CliRunner().invoke(app, ["study", str(scene), *over, "--out", str(tmp_path / "out")])
     assert answer.exit_code == 0
     assert "2 periodic" in answer.stdout
-    written = {"points.parquet", "points.nc", "study.json", "report.html"}
+    written = {"points.csv", "points.parquet", "points.nc", "study.json", "report.html"}
     assert written <= set(os.listdir(tmp_path / "out"))
     plan = json.loads((tmp_path / "out" / "study.json").read_text())
     assert plan["keys"] == ["feed.force"]
@@ -436,3 +448,4 @@ def test_the_command_writes_tables_and_tells_what_it_found(tmp_path):
     assert again.exit_code == 2
     twice = CliRunner().invoke(app, ["study", str(scene), *over, *over, "--out", str(tmp_path)])
     assert twice.exit_code == 2
+    assert "pyarrow" not in twice.stderr

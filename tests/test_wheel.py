@@ -98,7 +98,7 @@ def test_a_wheel_for_a_platform_compiles_nothing_and_writes_nothing(bare):
     assert files() == before
     refused = bare.call("accuracy", "reference")
     assert refused.returncode == 2
-    assert "numba is missing: pip install 'percussion_model[compile]'" in refused.stderr
+    assert 'numba is missing: pip install "percussion_model[compile]"' in refused.stderr
 
 
 def test_a_wheel_for_a_platform_makes_fmus_without_compiling(bare, built_library):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import sys
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -75,8 +76,14 @@ def kept_folder() -> Path:
 
 
 def brought_file(name: str) -> Path:
-    """Where an installation has the library for a platform, if it brings one."""
-    return HERE / "libraries" / f"{name}-{stamp()}{PLATFORMS[name].suffix}"
+    """Where an installation has the library for a platform, packed, if it brings one."""
+    return HERE / "libraries" / f"{name}-{stamp()}{PLATFORMS[name].suffix}.z"
+
+
+def _content(file: Path) -> bytes:
+    """Library of a file; what is brought goes into FMUs alone, so it is packed on disk."""
+    content = file.read_bytes()
+    return zlib.decompress(content) if file.suffix == ".z" else content
 
 
 def _file_in(folder: Path, name: str) -> Path:
@@ -117,7 +124,7 @@ def libraries(
             left = {name: file for name, file in files.items() if not file.is_file()}
             _compile(left, compilers, report)
             remove_old(folder.parent, "*/")
-    return {name: files[name].read_bytes() for name in words}
+    return {name: _content(files[name]) for name in words}
 
 
 def _compile(

@@ -22,6 +22,7 @@ from percussion_model.interface.commands.bits import bits
 from percussion_model.interface.commands.calibrate import calibrate
 from percussion_model.interface.commands.common import (
     BAD_INPUT,
+    EXTRAS,
     INTERRUPTED,
     ended_by,
     exit_code,
@@ -29,6 +30,7 @@ from percussion_model.interface.commands.common import (
     heed_termination,
     needs_extra,
     own_process,
+    package_of,
     print_message,
     refusal,
 )
@@ -189,10 +191,6 @@ def main() -> None:
     end_process(lambda: ended_by(_guarded(lambda: app(standalone_mode=False))))
 
 
-# Extras that install what only some commands need.
-_EXTRAS = {"scipy": "fit", "numba": "compile", "llvmlite": "compile"}
-
-
 def _guarded(work: Callable[[], Any]) -> int:
     """Turn errors that a user can mend into a message."""
     _begun.clear()
@@ -209,9 +207,8 @@ def _guarded(work: Callable[[], Any]) -> int:
             return print_message("interrupted before there was a result", INTERRUPTED)
         if type(error).__module__.partition(".")[0] in _packages:
             return print_message(str(error), BAD_INPUT)
-        missing = (getattr(error, "name", None) or "").partition(".")[0]
-        if isinstance(error, ImportError) and missing in _EXTRAS:
-            return print_message(needs_extra(error, _EXTRAS[missing]), BAD_INPUT)
+        if isinstance(error, ImportError) and package_of(error) in EXTRAS:
+            return print_message(needs_extra(error, EXTRAS[package_of(error)]), BAD_INPUT)
         # Bad arguments: typer hides the class of its errors.
         told = getattr(error, "format_message", None)
         if told is None:

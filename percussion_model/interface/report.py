@@ -181,7 +181,7 @@ def why_not_interactive() -> str:
         name = error.name or str(error)
         return (
             f"figures cannot be zoomed, since {name} is missing: "
-            "pip install 'percussion_model[report]'"
+            'pip install "percussion_model[report]"'
         )
     return ""
 

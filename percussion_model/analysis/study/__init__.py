@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ from percussion_model.analysis.study.points import (
     table,
 )
 from percussion_model.analysis.study.response import COMPUTING, FOUND, KINDS, run_points
-from percussion_model.analysis.study.store import Store
+from percussion_model.analysis.study.store import PARQUET, Store
 from percussion_model.analysis.study.workers import (
     end_if_started_again,
     on_a_cluster,
@@ -185,10 +186,13 @@ class Study:
         return lines
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write `points.parquet` and `points.nc` (NetCDF) to a folder, both or none."""
+        """Write `points.csv`, `points.nc` and, with pyarrow, `points.parquet`: all or none."""
         folder = Path(folder)
         with staged(folder) as draft:
-            self.to_pandas().to_parquet(draft / "points.parquet")
+            frame = self.to_pandas()
+            frame.to_csv(draft / "points.csv", index=False)
+            if find_spec(PARQUET) is not None:
+                frame.to_parquet(draft / "points.parquet")
             self.to_xarray().to_netcdf(draft / "points.nc", engine="h5netcdf")
             names = sorted(path.name for path in draft.iterdir())
         return [folder / name for name in names]

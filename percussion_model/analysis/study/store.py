@@ -27,7 +27,9 @@ from percussion_model.simulation.result import REPORT
 PLAN = "study.json"
 PARTS = "parts"
 # What a finished study has beside its parts.
-WRITTEN = ("points.parquet", "points.nc", REPORT)
+WRITTEN = ("points.csv", "points.parquet", "points.nc", REPORT)
+# What writes the one that is left out without it.
+PARQUET = "pyarrow"
 _WAYS_OUT = "--force replaces it, another --out keeps it"
 # Entries of a plan that say which sources compute, not what.
 OF_SOURCES = ("version", "sources")

@@ -156,7 +156,7 @@ def on_a_cluster(
         from distributed import Client, as_completed
     except ImportError as error:
         raise SimulationError(
-            f"a cluster needs {error.name}: pip install 'percussion_model[study]'"
+            f'a cluster needs {error.name}: pip install "percussion_model[cluster]"'
         ) from None
     try:
         client = Client(address, timeout="10s")

@@ -39,6 +39,8 @@ TERMINATED = 143  # and for SIGTERM
 COLLECT_AFTER = 100_000
 # So many files of a folder have a line each.
 FEW_FILES = 3
+# Extras of packages that more than one kind of command needs.
+EXTRAS = {"scipy": "fit", "numba": "compile", "llvmlite": "compile"}
 
 
 class BadValue(typer.BadParameter):
@@ -499,9 +501,15 @@ def needs_plot_extra(error: ImportError) -> str:
 
 
 def needs_extra(error: ImportError, extra: str) -> str:
-    """Say which package is missing, and the extra that installs it."""
-    name = error.name.partition(".")[0] if error.name else error
-    return f"{name} is missing: pip install 'percussion_model[{extra}]'"
+    """Say which package is missing, and the extra that installs it: its own, or else this one."""
+    name = package_of(error)
+    extra = EXTRAS.get(name, extra)
+    return f'{name or error} is missing: pip install "percussion_model[{extra}]"'
+
+
+def package_of(error: ImportError) -> str:
+    """Name of the package that is missing."""
+    return (error.name or "").partition(".")[0]
 
 
 @contextmanager

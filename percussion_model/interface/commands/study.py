@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from percussion_model.scene.scene import Scene
 
 # Packages that write tables and grids; checked before hours of work, not after.
-NEEDED = ("pandas", "pyarrow", "xarray", "h5netcdf", "h5py", "threadpoolctl")
+NEEDED = ("pandas", "xarray", "h5netcdf", "h5py", "threadpoolctl")
 
 # From so many points on their cost is told before; to find it takes two of them.
 MANY = 1000
@@ -69,18 +69,23 @@ def study(
         bool, typer.Option("--force", help="Replace another study that is in the folder.")
     ] = False,
 ) -> None:
-    """Map the stationary response over parameters: points.parquet and points.nc."""
+    """Map the stationary response over parameters: points.csv, .nc and .parquet."""
     from percussion_model.analysis.study import grid, latin_hypercube, read_axis
     from percussion_model.analysis.study import study as run_study
-    from percussion_model.analysis.study.store import PLAN
+    from percussion_model.analysis.study.store import PARQUET, PLAN
     from percussion_model.interface.progress import count_bar, progress
     from percussion_model.interface.terminal import show_study
     from percussion_model.scene.typical import hint_of
 
-    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise common.refusal(
-            f"a study needs {', '.join(missing)}: pip install 'percussion_model[study]'"
+            f'a study needs {", ".join(missing)}: pip install "percussion_model[study]"'
+        )
+    if find_spec(PARQUET) is None:
+        common.print_message(
+            f"no points.parquet, since {PARQUET} is missing: "
+            'pip install "percussion_model[parquet]"'
         )
     axes = dict(read_axis(text) for text in over)
     if len(axes) < len(over):
