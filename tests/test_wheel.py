@@ -103,7 +103,7 @@ def test_a_wheel_for_a_platform_compiles_nothing_and_writes_nothing(bare):
 
 def test_a_wheel_for_a_platform_makes_fmus_without_compiling(bare, built_library):
     bare.percussion("fmu", "rigid", "-o", "Hammer.fmu")
-    bare.percussion("native", "rigid", "-o", "native")
+    bare.percussion("native", "reference", "-o", "native")
     bare.percussion("system", "FeedControlRigid", "-o", "systems")
     done = bare.call("couple", "systems/FeedControlRigid.ssp", "--duration", "0.2",
                      "--no-figures", "--json", "-")  # fmt: skip

@@ -24,7 +24,8 @@ def package_outputs(scene: Scene, steps: int = STEPS, step: float = STEP) -> np.
     motion = Motion(scene, None)
     grid = motion.solver.grid_of("bit")
     if grid is not None:
-        place = find_cell(section_numbers(scene.bit), grid.mass, 0.5 * scene.bit.length)
+        find = getattr(find_cell, "py_func", find_cell)  # as Python, which needs no numba
+        place = find(section_numbers(scene.bit), grid.mass, 0.5 * scene.bit.length)
         motion.gauge = Gauge("bit", *place)
     reads = [one.read for one in OUTPUTS.values()]
     rows = []

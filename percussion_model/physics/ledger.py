@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import operator
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -31,7 +34,7 @@ def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
     ledger = {"initial": entries["start"]}
     ledger |= {name: entries[name] for name in (*WORKS, *DISSIPATED, *NUMERICAL, *STORED)}
     for name, parts in (("input", WORKS), ("stored", STORED), ("dissipated", DISSIPATED)):
-        ledger[name] = sum([entries[part] for part in parts])
+        ledger[name] = total(entries[part] for part in parts)
     ledger["residual"], scale = unexplained(entries)
     for name in (*NUMERICAL, "residual"):
         ledger[f"{name}_relative"] = ledger[name] / scale if scale > 0 else math.nan
@@ -41,9 +44,14 @@ def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
 def unexplained(entries: dict[str, float]) -> tuple[float, float]:
     """What no entry explains, and the energy put in that it is to be compared with [J]."""
     works = [entries[name] for name in WORKS]
-    stored = sum([entries[name] for name in STORED])
-    dissipated = sum([entries[name] for name in DISSIPATED])
+    stored = total(entries[name] for name in STORED)
+    dissipated = total(entries[name] for name in DISSIPATED)
     start = entries["start"]
-    apart = sum([entries[name] for name in NUMERICAL])
-    residual = start + sum(works) - stored - dissipated - apart
-    return residual, abs(start) + sum(map(abs, works))
+    apart = total(entries[name] for name in NUMERICAL)
+    residual = start + total(works) - stored - dissipated - apart
+    return residual, abs(start) + total(map(abs, works))
+
+
+def total(values: Iterable[float]) -> float:
+    """Sum, rounded as in the library of FMUs; `sum` has no roundings from Python 3.12 on."""
+    return functools.reduce(operator.add, values, 0.0)

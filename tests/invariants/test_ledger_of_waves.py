@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation
-from percussion_model.physics.ledger import unexplained
+from percussion_model.physics.ledger import total, unexplained
 from percussion_model.solvers.base import make_solver
 from tests.invariants.ledger_scenes import random_scene
 
@@ -26,6 +26,10 @@ def ledger_at(scene, end):
     simulation.advance(simulation.solver.grid_point_after(simulation.save().state, end))
     ledger = simulation.energy()
     return ledger, unexplained(ledger | {"start": ledger["initial"]})[1]
+
+
+def test_sums_have_the_roundings_of_compiled_code_in_every_python():
+    assert total([1e16, 1.0, -1e16]) == 0.0
 
 
 @pytest.mark.parametrize(
