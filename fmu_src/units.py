@@ -80,7 +80,8 @@ def _exponents(name: str) -> dict[str, int]:
         for factor in filter(None, product.split(".")):
             read = _FACTOR.fullmatch(factor)
             if factor != "1" and (read is None or read[1] not in UNITS):
-                raise ValueError(f"unit {name!r}: {factor!r} must be one of {', '.join(UNITS)}")
+                must = f"one of {', '.join(UNITS)}, with a whole exponent"
+                raise ValueError(f"unit {name!r}: {factor!r} must be {must}")
             if read:
                 for base, power in UNITS[read[1]].base.items():
                     found[base] = found.get(base, 0) + sign * power * int(read[2] or 1)

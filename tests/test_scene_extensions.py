@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from percussion_model import Simulation
+from percussion_model.physics.kernel import inlined
 from percussion_model.scene import solver_names
 from percussion_model.scene.parameters import (
     COMPONENTS,
@@ -93,6 +95,47 @@ def test_a_field_of_a_component_is_no_parameter_of_it():
     twice = Component("seal", "seal", FRICTION.parameters, max, state={"force": ("N", "F", 0.0)})
     with pytest.raises(ValueError, match="component seal: force is a parameter and a field"):
         groups_with([twice])
+
+
+@inlined
+def push(par, s, h):
+    return 0.0
+
+
+SEAL = Component("seal", "seal", FRICTION.parameters, push)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"on_piston": None}, "it has no kernel"),
+        ({"lasts": push}, "lasts takes 3 arguments: must be 2"),
+        ({"is_drive": True, "on_piston": None, "on_bit": push}, "a drive has a kernel on_piston"),
+        ({"parameters": {"a": (3.0, "N", "F", 0.0, 1.0)}}, "a is 3.0 by default: must be from 0.0"),
+        ({"inputs": ("force", "load")}, "inputs: load must be one of force"),
+        ({"state": {"a": ("N", "F", "b")}}, "state: b must be one of force"),
+        ({"of_blow": ("force",)}, "of_blow: force must be one of none"),
+    ],
+)
+def test_what_is_wrong_with_a_component_is_told(changes, told):
+    assert not SEAL.fault
+    assert SEAL._replace(**changes).fault.startswith(told)
+
+
+@pytest.mark.parametrize("needs", [{"effects.rokc": ("none",)}, {"effects.rock": ("nothing",)}])
+def test_a_component_needs_what_there_is(needs):
+    with pytest.raises(ValueError, match=r"component seal: needs effects\.ro.* = \('no"):
+        groups_with([SEAL._replace(needs=needs)])
+
+
+def test_without_what_it_needs_a_component_is_off():
+    turning = {"effects.rotation": True, "rotation.mean_radius": 0.03}
+    for rock, is_on in (("power", True), ("spring", False)):
+        scene = Scene().computed_by("rigid", **turning, **{"effects.rock": rock})
+        simulation = Simulation(scene)
+        simulation.advance(0.05)
+        assert (simulation.observe()["rotation_angle"] > 0.0) == is_on
+        assert ("effects.rotation" in scene.unused) != is_on
 
 
 def test_a_scene_has_the_groups_that_components_bring(tmp_path):

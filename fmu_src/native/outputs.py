@@ -27,7 +27,7 @@ _START = _WORD["e_start"]
 _WORKS = tuple(_WORD[f"e_{name}"] for name in WORKS)
 _DISSIPATED = tuple(_WORD[f"e_{name}"] for name in DISSIPATED)
 _NUMERICAL = tuple(_WORD[f"e_{name}"] for name in NUMERICAL)
-_STORED = tuple(_WORD[name] for name in STORED)
+_STORED = tuple(_WORD[name if name in _WORD else f"e_{name}"] for name in STORED)
 
 AT = {name: k for k, name in enumerate(OUTPUTS)}
 OUTPUT_COUNT = len(AT)

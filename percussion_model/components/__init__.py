@@ -14,6 +14,15 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
+from percussion_model.physics.kernel import DISABLED, Kernel
+
+Side = Literal["work", "dissipated", "stored"]
+# Kernels of a component, and how many arguments each takes.
+_ARGUMENTS = {
+    **dict.fromkeys(("on_piston", "on_bit", "pass_time", "gained", "end_loading", "kept"), 3),
+    **dict.fromkeys(("lasts", "slope"), 2),
+    "next_blow": 7,
+}
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -35,6 +44,8 @@ class Component(NamedTuple):
         on_...(par, s, h) -> mean force over the next time h in which the body moves on, down
         positive [N]. A mean that is off by h^2 makes a motion that is off by h^2. A force on
         the piston is part of the drive's.
+    stores : bool
+        It gives back what these forces take, as a spring: the ledger counts that as stored.
     state : mapping of tuple
         Unit, description and start of each field by name: a number, or the name of a parameter
         that holds it. Kernels find the field X as `s.NAME_X`, and it is a column `NAME_X`.
@@ -57,16 +68,16 @@ class Component(NamedTuple):
     of_blow : tuple of str
         Fields of the state whose value after a blow is a column of blows, `NAME_X`.
     entries : mapping of tuple
-        Further entries of the ledger by name: "work" or "dissipated", and what it is. Kernels
-        add to `s.e_ENTRY`.
+        Further entries of the ledger by name: "work", "dissipated" or "stored", and what it is.
+        Kernels add to `s.e_ENTRY`.
     needs : mapping of tuple
-        What must hold for it to matter: values that a key may have, by the key.
+        What must hold for it to be on: values that a key may have, by the key.
     is_drive : bool
         It is a choice of `effects.drive`, by its name, and no switch; its works are the drive's,
         and it sets `s.armed` where the next closure of the gap begins a blow.
     lasts : kernel or None
-        lasts(par, s) -> time for which its mean forces may be taken as constant [s]. Without
-        it modes make no leaps.
+        lasts(par, s) -> time above 0 for which its mean forces may be taken as constant [s].
+        Without it modes make no leaps.
     slope : kernel or None
         slope(par, s) -> how fast the force on the piston changes while it lasts [N/s].
     hidden : tuple of str
@@ -88,13 +99,14 @@ class Component(NamedTuple):
     kept: Callable[..., float] | None = None
     next_blow: Callable[..., None] | None = None
     of_blow: tuple[str, ...] = ()
-    entries: Mapping[str, tuple[Literal["work", "dissipated"], str]] = _NOTHING
+    entries: Mapping[str, tuple[Side, str]] = _NOTHING
     needs: Mapping[str, tuple[Any, ...]] = _NOTHING
     is_drive: bool = False
     lasts: Callable[..., float] | None = None
     slope: Callable[..., float] | None = None
     hidden: tuple[str, ...] = ()
     usual: Mapping[str, tuple[float, float]] = _NOTHING
+    stores: bool = False
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -113,17 +125,56 @@ class Component(NamedTuple):
         return tuple(body for body, force in forces.items() if force is not None)
 
     @property
-    def ledger(self) -> dict[str, tuple[str, str]]:
+    def ledger(self) -> dict[str, tuple[Side, str]]:
         """Entries of the ledger, that of its force before others: side and meaning by name."""
         taken = f"taken from the {' and the '.join(self.pushes)} by this force"
         is_own = self.pushes and not self.is_drive
-        of_force = {self.name: ("dissipated", taken)} if is_own else {}
+        side: Side = "stored" if self.stores else "dissipated"
+        of_force = {self.name: (side, taken)} if is_own else {}
         return {**of_force, **self.entries}
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with the definition; empty if nothing is."""
+        for port, count in _ARGUMENTS.items():
+            kernel = getattr(self, port)
+            if kernel is None:
+                continue
+            if not (DISABLED or isinstance(kernel, Kernel)):
+                return f"{port}: a kernel has a decorator, as `inlined`"
+            if kernel.__code__.co_argcount != count:
+                return f"{port} takes {kernel.__code__.co_argcount} arguments: must be {count}"
+        if all(getattr(self, port) is None for port in _ARGUMENTS):
+            return "it has no kernel"
+        if self.is_drive and self.on_piston is None:
+            return "a drive has a kernel on_piston"
+        for name, (default, _, _, lower, upper) in self.parameters.items():
+            if default is not None and not lower <= default <= upper:
+                return f"{name} is {default!r} by default: must be from {lower!r} to {upper!r}"
+        starts = {start for *_, start in self.state.values() if isinstance(start, str)}
+        for where, names, known in (
+            ("state", starts, self.parameters),
+            ("inputs", self.inputs, self.parameters),
+            ("usual", self.usual, self.parameters),
+            ("of_blow", self.of_blow, self.state),
+        ):
+            for name in sorted({*names} - {*known}):
+                return f"{where}: {name} must be one of {', '.join(known) or 'none'}"
+        return ""
+
+
+def _component(name: str) -> Component:
+    found = getattr(import_module(f"{__name__}.{name}"), "COMPONENT", None)
+    file = f"{name}.py of percussion_model/components"
+    if not isinstance(found, Component):
+        raise ValueError(f"{file}: it defines no COMPONENT")
+    if fault := found.fault:
+        raise ValueError(f"{file}: {fault}")
+    return found
 
 
 def _components() -> tuple[Component, ...]:
-    names = sorted(module.name for module in iter_modules(__path__))
-    return tuple(import_module(f"{__name__}.{name}").COMPONENT for name in names)
+    return tuple(_component(name) for name in sorted(one.name for one in iter_modules(__path__)))
 
 
 COMPONENTS = _components()
@@ -133,8 +184,8 @@ FORCES = tuple(one for one in COMPONENTS if one.pushes)
 DRIVES = tuple(one for one in COMPONENTS if one.is_drive)
 
 
-def entries_on(side: str) -> tuple[str, ...]:
-    """Names of the ledger's entries of components that are "work" or "dissipated"."""
+def entries_on(side: Side) -> tuple[str, ...]:
+    """Names of the ledger's entries of components on a side."""
     return tuple(
         name for one in COMPONENTS for name, (found, _) in one.ledger.items() if found == side
     )

@@ -18,7 +18,7 @@ DISSIPATED = (
     *entries_on("dissipated"),
 )
 NUMERICAL = ("numerical", "overshoot")
-STORED = ("kinetic", "elastic", "recoverable")
+STORED = ("kinetic", "elastic", "recoverable", *entries_on("stored"))
 
 # They stand at the end of a reading.
 _ENERGIES = (*LEDGER_FIELDS, *STORED_FIELDS)

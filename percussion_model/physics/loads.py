@@ -12,7 +12,7 @@ from typing import Any
 from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.blows import push_event
 from percussion_model.physics.feed import feed_on_bit, throttle
-from percussion_model.physics.kernel import composed, inlined, merged
+from percussion_model.physics.kernel import LEAST_DIVISOR, composed, inlined, merged
 from percussion_model.physics.records import DriveKind, EventKind
 
 
@@ -169,7 +169,7 @@ def pass_time(par, s, h):
 @inlined
 def bend_of(par, s, h):
     """Way that a piston is late or early by where a mean force was held for a changing one [m]."""
-    way = -slope_on_piston(par, s) * h * h * h / (12.0 * par.mass_p)
+    way = -slope_on_piston(par, s) * h * h * h / (12.0 * max(par.mass_p, LEAST_DIVISOR))
     s.path_p += way
     return way
 

@@ -11,7 +11,7 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from typing import Any, Self
@@ -51,6 +51,7 @@ from percussion_model.scene.group import (
 )
 from percussion_model.scene.retired import BLOW_MAP, BLOW_MAP_TABLE
 from percussion_model.scene.rows import (
+    REFUSED,
     SIMILAR_ENOUGH,
     Needs,
     ParameterRow,
@@ -440,12 +441,12 @@ _BUILT_IN: dict[str, type[Parameters]] = {
 }
 
 
-def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
+def groups_with(components: Sequence[Component]) -> dict[str, type[Parameters]]:
     """Return the groups of a scene, the built-in ones and those that components add.
 
     Parameters
     ----------
-    components : iterable of Component
+    components : sequence of Component
         Each gets a switch in `effects` and, for its parameters, a group of its own.
     """
     groups = dict(_BUILT_IN)
@@ -476,6 +477,12 @@ def groups_with(components: Iterable[Component]) -> dict[str, type[Parameters]]:
         groups["effects"] = _group("Effects", plain, plain.__doc__, switches)
     for key, group in groups.items():
         group.key = key
+    rows = {row.key: row for row in table_of(groups)}
+    for one in components:
+        for key, values in one.needs.items():
+            if key not in rows or REFUSED in map(rows[key].read, values):
+                must = f"must be {rows[key].allowed}" if key in rows else "there is no such key"
+                raise ValueError(f"component {one.name}: needs {key} = {values!r}: {must}")
     return groups
 
 
@@ -496,6 +503,15 @@ def _group(
     return type(name, (base,), {**about, **fields})
 
 
+def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
+    """Go through the rows of groups; keys of sections have a `*` for their number."""
+    for key, group in groups.items():
+        for name, row in group.rows.items():
+            yield dataclasses.replace(row, key=f"{key}.{name}")
+            if row.kind in LISTED:
+                yield from table_of({f"{key}.{name}.*": LISTED[row.kind]})
+
+
 # The groups of a scene, in the order in which they are written.
 GROUPS = groups_with(COMPONENTS)
 # Objects of the added ones are found here by name, when they come from another process.
@@ -506,15 +522,6 @@ globals().update({group.__name__: group for group in GROUPS.values()})
 def parameter_table() -> tuple[ParameterRow, ...]:
     """Return a row for each parameter, in the order of a scene file."""
     return (HOLE_DIAMETER, *table_of(GROUPS))
-
-
-def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
-    """Go through the rows of groups; keys of sections have a `*` for their number."""
-    for key, group in groups.items():
-        for name, row in group.rows.items():
-            yield dataclasses.replace(row, key=f"{key}.{name}")
-            if row.kind in LISTED:
-                yield from table_of({f"{key}.{name}.*": LISTED[row.kind]})
 
 
 @cache

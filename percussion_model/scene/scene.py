@@ -54,7 +54,13 @@ LONGEST_TITLE = 1000
 # Groups that nothing was given of; they cannot change, so all scenes share them.
 _DEFAULTS = {name: group() for name, group in GROUPS.items()}
 
-
+# Parameters of components that have no default.
+_REQUIRED = [
+    row_of(f"{one.name}.{name}")
+    for one in COMPONENTS
+    for name, (default, *_) in one.parameters.items()
+    if default is None
+]
 # Keys of the pressure law.
 LAW = ("drive.force", "drive.reversal_distance")
 
@@ -476,4 +482,7 @@ def refuse_contradictions(scene: Scene) -> None:
         # places in the text name values by their keys
         groups = {name: scene.__dict__[name] for name in GROUPS}
         raise SceneError(TEXTS[found].format(**groups))
+    for row in _REQUIRED:
+        if scene[row.key] is None and scene.matters(row.key):
+            raise SceneError(f"{row.effect} needs {row.key}, {row.description}: give it")
     refuse_joints(scene)

@@ -10,6 +10,7 @@ import numpy as np
 from percussion_model.physics.oil import REFERENCE
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.inputs import PRESSURES
+from percussion_model.scene.parameters import row_of
 from percussion_model.scene.rocks import read_rock
 from percussion_model.scene.rocks.breaking import rock_of
 from percussion_model.scene.scales import barrier_shares
@@ -104,12 +105,13 @@ def unused_note(keys: Iterable[str]) -> str:
     """Say that parameters were given that nothing of the scene needs."""
     tables: dict[str, list[str]] = {}
     for key in keys:
-        tables.setdefault(key.rpartition(".")[0], []).append(key)
-    told = (
+        told = f"{key} (needs {row_of(key).effect})" if key.startswith("effects.") else key
+        tables.setdefault(key.rpartition(".")[0], []).append(told)
+    all_told = (
         ", ".join(found) if len(found) <= MOST_NAMED else f"{table} ({len(found)} keys)"
         for table, found in tables.items()
     )
-    return f"given, but without effect in this scene: {', '.join(told)}"
+    return f"given, but without effect in this scene: {', '.join(all_told)}"
 
 
 def least_loss_time(result: Result) -> float:

@@ -98,24 +98,34 @@ def _all(fills: list[Callable]) -> Callable:
     return _both(_all(fills[:middle]), _all(fills[middle:]))
 
 
+def _where(field: str, numbers: tuple[float, ...], fill: Callable) -> Callable:
+    @composed
+    def fill_where(record: Any, values: Any) -> None:
+        if values[field] in numbers:
+            fill(record, values)
+
+    return fill_where
+
+
 def _component(one: Component) -> Callable:
-    (switch, number), present = setup.switch_of(one), f"with_{one.name}"
+    present = f"with_{one.name}"
     pushes, moves = len(one.pushes) > 0, setup.follows_blows(one)
     steps = pushes and one.lasts is None
     numbers = _all([_number(name, name) for name in (f"{one.name}_{of}" for of in one.parameters)])
 
     @composed
     def fill(p: Any, values: Any) -> None:
-        if values[switch] == number:
-            p[present] = 1
-            if pushes:
-                p["effects"] = 1
-            if steps:
-                p["steps"] = 1
-            if moves:
-                p["places"] = 1
-            numbers(p, values)
+        p[present] = 1
+        if pushes:
+            p["effects"] = 1
+        if steps:
+            p["steps"] = 1
+        if moves:
+            p["places"] = 1
+        numbers(p, values)
 
+    for field, found in setup.conditions_of(one).items():
+        fill = _where(field, found, fill)
     return fill
 
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from percussion_model.components import COMPONENTS, Component
-from percussion_model.components import DRIVES as ADDED_DRIVES
-from percussion_model.physics.records import BUILT_IN_DRIVES, DRIVES, DriveKind, Mode, Piston
+from percussion_model.physics.records import DRIVES, DriveKind, Mode, Piston
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.contradictions import ON_CASING
 from percussion_model.scene.numbers import Numbers
+from percussion_model.scene.parameters import row_of
 from percussion_model.scene.rock_law import fill_rock, rock_numbers
 
 # An open gap of this many transits of the slower bar ends a blow where no
@@ -114,18 +114,24 @@ def follows_blows(one: Component) -> bool:
     return any(kernel is not None for kernel in kernels)
 
 
-def switch_of(one: Component) -> tuple[str, int]:
-    """Field of a scene's numbers that turns a component on, and its number then."""
-    if one.is_drive:
-        return "effects_drive", len(BUILT_IN_DRIVES) + ADDED_DRIVES.index(one)
-    return f"effects_{one.name}", 1
+def conditions_of(one: Component) -> dict[str, tuple[float, ...]]:
+    """Fields of a scene's numbers that turn a component on, and their numbers then."""
+    key, value = one.switch
+    return {
+        need.replace(".", "_"): tuple(_number_of(need, value) for value in values)
+        for need, values in {key: (value,), **one.needs}.items()
+    }
+
+
+def _number_of(key: str, value: Any) -> float:
+    choices = row_of(key).choices
+    return choices.index(value) if choices else value
 
 
 def fill_components(p: Any, values: Any) -> None:
     """Fill the parameters of the components that are on."""
     for one in COMPONENTS:
-        field, number = switch_of(one)
-        if getattr(values, field) == number:
+        if all(getattr(values, field) in found for field, found in conditions_of(one).items()):
             p[f"with_{one.name}"] = 1
             if one.pushes:
                 p["effects"] = 1

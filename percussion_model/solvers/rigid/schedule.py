@@ -221,7 +221,7 @@ def schedule(par, s):
     longest = NEVER
     if par.effects == 1:
         lasts = lasting(par, s)
-        longest = lasts if lasts < NEVER else par.window
+        longest = lasts if 0.0 < lasts < NEVER else par.window
     hold_components(par, s, longest)
     find_next(par, s, longest)
     if 0.0 < s.next_tau < longest < NEVER:
