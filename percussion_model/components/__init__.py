@@ -20,7 +20,7 @@ Side = Literal["work", "dissipated", "stored"]
 # Kernels of a component, and how many arguments each takes.
 _ARGUMENTS = {
     **dict.fromkeys(("on_piston", "on_bit", "pass_time", "gained", "end_loading", "kept"), 3),
-    **dict.fromkeys(("lasts", "slope"), 2),
+    **dict.fromkeys(("lasts", "slope", "loading"), 2),
     "next_blow": 7,
 }
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -53,6 +53,10 @@ class Component(NamedTuple):
         pass_time(par, s, h): take the state on by a time h, at whose end the bodies are.
     inputs : tuple of str
         Parameters that may change during a run: kernels find X as `s.NAME_X`.
+    loading : kernel or None
+        loading(par, x) -> f(x), f'(x) and its integral from 0: rock is loaded by the force
+        K_R P_0 f(P / P_0) of each button in place of the power, which it `needs`. f grows with f'
+        and is 1 at 1.
     gained : kernel or None
         gained(par, s, deeper) -> part of what a loading crushes deeper [m] by which the hole
         advances; the bit climbs out of the rest where it turns.
@@ -107,6 +111,7 @@ class Component(NamedTuple):
     hidden: tuple[str, ...] = ()
     usual: Mapping[str, tuple[float, float]] = _NOTHING
     stores: bool = False
+    loading: Callable[..., tuple[float, float, float]] | None = None
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -148,6 +153,8 @@ class Component(NamedTuple):
             return "it has no kernel"
         if self.is_drive and self.on_piston is None:
             return "a drive has a kernel on_piston"
+        if self.loading and self.needs.get("effects.rock") != ("power",):
+            return 'with loading it needs {"effects.rock": ("power",)}'
         for name, (default, _, _, lower, upper) in self.parameters.items():
             if default is not None and not lower <= default <= upper:
                 return f"{name} is {default!r} by default: must be from {lower!r} to {upper!r}"

@@ -13,6 +13,7 @@ import math
 from percussion_model.physics.kernel import inlined, kernel, merged
 from percussion_model.physics.power_law import (
     CHIPPING_SLOPE,
+    exponent_at,
     is_chipping,
     is_reloading,
     loading_force,
@@ -95,7 +96,8 @@ def _longest(par, s, p, least):
     """Way in which what loads the rock grows little enough [m]."""
     if is_reloading(s, p):
         return math.inf
-    way = max(GROWTH / par.exponent * loading_part(par, s, p), least)
+    part = loading_part(par, s, p)
+    way = max(GROWTH / exponent_at(par, part) * part, least)
     return way / CHIPPING_SLOPE if is_chipping(par, s, p) else way
 
 

@@ -1,5 +1,6 @@
 """Loading and unloading of the rock by a power law, with chipping and with cuttings.
 
+A component may give another curve of loading (`loading`), which has all else of the law.
 Eqs 20b to 20e of docs/model.md. Of the penetration a part loads the rock: all of it, but for
 the step in which the rock chips at a nearly constant force. Cuttings that flushing leaves in the
 crater (eqs 24 and 25 of the paper, with units) are first compressed again, on the line on which
@@ -9,9 +10,12 @@ rock unloads from there.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
+from percussion_model.components import COMPONENTS, Component
 from percussion_model.physics.elementary import exp, log
-from percussion_model.physics.kernel import inlined, kernel, merged, scalar
+from percussion_model.physics.kernel import LEAST_DIVISOR, composed, inlined, kernel, merged, scalar
 from percussion_model.physics.records import Cuttings
 
 # Below this share of the reference penetration, or of the force there, the power law goes on as
@@ -25,6 +29,54 @@ LEAST_RECOVERED = 1e-4
 MOST_TURNS = 60
 # Depth of a crater of which `rock.removed_share` is removed [m].
 CRATER = 1e-3
+
+
+class Curve(NamedTuple):
+    """Where a part of the penetration is on a component's curve of loading."""
+
+    force: float  # [N]
+    slope: float  # [N/m]
+    work: float  # [J]
+
+
+@composed
+def _straight(par: Any, x: float) -> tuple[float, float, float]:
+    return x, 1.0, 0.5 * x * x
+
+
+def _or_loading(before: Callable, one: Component) -> Callable:
+    if one.loading is None:
+        return before
+    loading, present = one.loading, f"with_{one.name}"
+
+    @composed
+    def either(par: Any, x: float) -> tuple[float, float, float]:
+        return loading(par, x) if par[present] == 1 else before(par, x)
+
+    return either
+
+
+# loading_of(par, x): force, slope and work by those of K_R at P_0 where x of that loads.
+loading_of = _straight
+for _one in COMPONENTS:
+    loading_of = _or_loading(loading_of, _one)
+
+
+@kernel
+def on_curve(par, k, part):
+    """Place on the curve of loading that a component gives, with a stiffness [N/m]."""
+    P = par.reference_penetration
+    force, slope, work = loading_of(par, part / P)
+    return Curve(k * P * force, k * max(slope, LEAST_SHARE), k * P * P * work)
+
+
+@kernel
+def exponent_at(par, part):
+    """Exponent of the power that loads as the rock does at a part of the penetration."""
+    if par.by_component == 0 or part <= 0.0:
+        return par.exponent
+    here = on_curve(par, 1.0, part)
+    return part * here.slope / max(here.force, LEAST_DIVISOR)
 
 
 @kernel
@@ -70,6 +122,8 @@ def loading_force(par, s, p):
 def fresh_force(par, s, p):
     """Force of rock that no cuttings cover [N]."""
     part = loading_part(par, s, p)
+    if par.by_component == 1:
+        return on_curve(par, s.k_r, part).force
     return s.k_r * part * growth(par, part)
 
 
@@ -79,7 +133,10 @@ def loading_slope(par, s, p):
     if is_reloading(s, p):
         return s.reload_stiffness
     part = loading_part(par, s, p)
-    slope = par.exponent * s.k_r * growth(par, part)
+    if par.by_component == 1:
+        slope = on_curve(par, s.k_r, part).slope
+    else:
+        slope = par.exponent * s.k_r * growth(par, part)
     return CHIPPING_SLOPE * slope if is_chipping(par, s, p) else slope
 
 
@@ -115,7 +172,7 @@ def loading_work(par, s, p):
 @kernel
 def force_and_work(par, s, p):
     """`loading_force` [N] and `loading_work` [J] at a penetration."""
-    if par.chipping_penetration > 0.0 or is_reloading(s, p):
+    if par.by_component == 1 or par.chipping_penetration > 0.0 or is_reloading(s, p):
         return loading_force(par, s, p), loading_work(par, s, p)
     force = s.k_r * p * growth(par, p)
     return force, force * p / (par.exponent + 1.0)
@@ -125,18 +182,29 @@ def force_and_work(par, s, p):
 def fresh_work(par, s, p):
     """Work from no penetration to `p` on rock that no cuttings cover [J]."""
     part = loading_part(par, s, p)
-    work = s.k_r * part * part * growth(par, part) / (par.exponent + 1.0)
+    work = work_of_part(par, s.k_r, part)
     if par.chipping_penetration > 0.0 and p > s.chipping_from:
         first = s.chipping_from
         last = first + CHIPPING_SLOPE * min(p - first, par.chipping_penetration)
         # the same forces over a longer way
+        if par.by_component == 1:
+            more = work_of_part(par, s.k_r, last) - work_of_part(par, s.k_r, first)
+            return work + (1.0 / CHIPPING_SLOPE - 1.0) * more
         more = last * last * growth(par, last) - first * first * growth(par, first)
         work += (1.0 / CHIPPING_SLOPE - 1.0) * s.k_r * more / (par.exponent + 1.0)
     return work
 
 
+@inlined
+def work_of_part(par, k, part):
+    """Work of a loading without chipping, with a stiffness [N/m] [J]."""
+    if par.by_component == 1:
+        return on_curve(par, k, part).work
+    return k * part * part * growth(par, part) / (par.exponent + 1.0)
+
+
 @kernel
-def recovered_share(par, s, force):
+def recovered_share(par, s, part, force):
     """Penetration that the rock gives back from a peak force, by the part that loaded it.
 
     1/gamma at the force of the reference penetration, a power of the force beside it; never so
@@ -146,7 +214,7 @@ def recovered_share(par, s, force):
     if par.unloading_exponent > 0.0:
         relative = max(force / (s.k_r * par.reference_penetration), LEAST_SHARE)
         share = max(share * exp(-par.unloading_exponent * log(relative)), LEAST_RECOVERED)
-    return min(share, 1.0 / par.exponent)
+    return min(share, 1.0 / exponent_at(par, part))
 
 
 @inlined
@@ -154,7 +222,8 @@ def fresh_recovery(par, s, p, force):
     """Penetration that rock gives back from a peak, in a cycle that began without a force [m]."""
     if is_reloading(s, p):
         return p - s.reload_from
-    return loading_part(par, s, p) * recovered_share(par, s, force)
+    part = loading_part(par, s, p)
+    return part * recovered_share(par, s, part, force)
 
 
 @kernel
@@ -175,8 +244,27 @@ def recoverable_by_power(par, s, p, force):
 @kernel
 def part_at(par, k, force):
     """Part of the penetration that loads at a force, with a loading stiffness `k` [m]."""
+    if par.by_component == 1:
+        return part_on_curve(par, k, force)
     relative = max(force / (k * par.reference_penetration), LEAST_SHARE)
     return par.reference_penetration * exp(log(relative) / par.exponent)
+
+
+@merged
+def part_on_curve(par, k, force):
+    """The same on the curve of a component, by halves."""
+    low, high = 0.0, par.reference_penetration
+    for _ in range(MOST_TURNS):
+        if on_curve(par, k, high).force >= force:
+            break
+        low, high = high, 2.0 * high
+    for _ in range(MOST_TURNS):
+        mid = 0.5 * (low + high)
+        if on_curve(par, k, mid).force < force:
+            low = mid
+        else:
+            high = mid
+    return high
 
 
 @scalar
@@ -202,7 +290,8 @@ def secant_stiffness(force, stiffness, exponent, reference_penetration):
 @merged
 def peak_above(par, s, left):
     """Penetration from which the rock would unload to `left` [m]."""
-    if par.exponent == 1.0 and par.unloading_exponent == 0.0 and par.chipping_penetration == 0.0:
+    bent = par.by_component == 1 or par.chipping_penetration > 0.0
+    if par.exponent == 1.0 and par.unloading_exponent == 0.0 and not bent:
         return left * s.gamma / (s.gamma - 1.0)
     low, high = left, 2.0 * left
     for _ in range(MOST_TURNS):

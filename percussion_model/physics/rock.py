@@ -561,7 +561,8 @@ def take_line(par, s):
     where the rock begins and ends to chip.
     """
     a = s.p
-    if par.exponent == 1.0 and par.chipping_penetration == 0.0 and not is_reloading(s, a):
+    straight = par.exponent == 1.0 and par.by_component == 0
+    if straight and par.chipping_penetration == 0.0 and not is_reloading(s, a):
         s.line_stiffness, s.line_origin, s.line_end = s.k_r, 0.0, math.inf
         return
     kink = next_kink(par, s, a)

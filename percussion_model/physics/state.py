@@ -25,6 +25,7 @@ COMMON_PARAMETERS = [
     ("barrier", "i8"),  # 1: the energy barrier is on
     ("threshold", "f8"),  # energy above which a cycle begins, by W_R
     ("power", "i8"),  # 1: the rock is loaded by a power law
+    ("by_component", "i8"),  # 1: or by the curve of a component in its place
     ("exponent", "f8"),  # n and q of the power law
     ("unloading_exponent", "f8"),
     ("reference_penetration", "f8"),  # [m]

@@ -110,7 +110,7 @@ def _where(field: str, numbers: tuple[float, ...], fill: Callable) -> Callable:
 def _component(one: Component) -> Callable:
     present = f"with_{one.name}"
     pushes, moves = len(one.pushes) > 0, setup.follows_blows(one)
-    steps = pushes and one.lasts is None
+    steps, loads = pushes and one.lasts is None, one.loading is not None
     numbers = _all([_number(name, name) for name in (f"{one.name}_{of}" for of in one.parameters)])
 
     @composed
@@ -122,6 +122,8 @@ def _component(one: Component) -> Callable:
             p["steps"] = 1
         if moves:
             p["places"] = 1
+        if loads:
+            p["power"] = p["by_component"] = 1
         numbers(p, values)
 
     for field, found in setup.conditions_of(one).items():

@@ -139,6 +139,8 @@ def fill_components(p: Any, values: Any) -> None:
                     p["steps"] = 1
             if follows_blows(one):
                 p["places"] = 1
+            if one.loading is not None:
+                p["power"] = p["by_component"] = 1
             for name in one.parameters:
                 p[f"{one.name}_{name}"] = getattr(values, f"{one.name}_{name}")
 

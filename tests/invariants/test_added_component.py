@@ -22,25 +22,24 @@ import percussion_model
 ROOT = Path(percussion_model.__file__).parents[1]
 LONG = os.environ.get("PERCUSSION_LONG") == "1"
 
-DRAG = '''
-"""Viscous drag on the bit, F = -c v."""
+HERTZ = '''
+"""Loading of the rock as by a sphere, F = K_R P_0 x^1.5."""
+
+import math
 
 from percussion_model.components import Component
 from percussion_model.physics.kernel import inlined
 
 
 @inlined
-def drag_force(par, s, h):
-    """Force of the drag on the bit at its present velocity [N]."""
-    return -par.drag_damping * s.v_b
+def loading(par, x):
+    """Force, slope and work by those of K_R at P_0."""
+    root = math.sqrt(x)
+    return x * root, 1.5 * root, 0.4 * x * x * root
 
 
-COMPONENT = Component(
-    "drag",
-    "viscous drag on the bit",
-    {"damping": (0.0, "N s/m", "force by velocity", 0.0, 1e6)},
-    on_bit=drag_force,
-)
+needs = {"effects.rock": ("power",)}
+COMPONENT = Component("hertz", "loading by a sphere", {}, loading=loading, needs=needs)
 '''
 
 CHAMBERS = '''
@@ -188,7 +187,7 @@ def run(tmp_path_factory):
     copy = folder / "percussion_model"
     leave_out = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "percussion_model", copy, ignore=leave_out)
-    for name, text in (("drag", DRAG), ("chambers", CHAMBERS), ("swivel", SWIVEL)):
+    for name, text in (("hertz", HERTZ), ("chambers", CHAMBERS), ("swivel", SWIVEL)):
         (copy / "components" / f"{name}.py").write_text(text)
 
     def run(solver, **changes):
@@ -214,20 +213,14 @@ def run(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", COARSE)
-def test_a_drag_on_the_bit(run, solver):
-    damping = 2e3  # [N s/m]
-    found = run(solver, **{"effects.drag": True, "drag.damping": damping})
-    # M v' = F - c v from rest
-    force, mass = 2500.0, percussion_model.Scene().bit.mass
-    rate = damping / mass
-    fade = -math.expm1(-rate * END)
-    velocity = force / damping * fade
-    taken = force**2 / damping * (END - fade / rate - 0.5 * fade * fade / rate)
-    alone = found["alone"]
-    assert alone["bit_velocity"] == pytest.approx(velocity, rel=0.01)
-    assert alone["drag"] == pytest.approx(taken, rel=0.01)
-    assert alone["dissipated"] >= (1.0 - 1e-12) * alone["drag"]  # but for rounding
-    assert all(entries["drag"] > 0.0 for entries in found.values())
+def test_a_rock_law(run, solver):
+    rock = {"effects.rock": "power", "rock.loading_exponent": 1.5}
+    by_power = run(solver, **rock)["drill"]
+    # the exponent of the scene has no part in it
+    rock |= {"effects.hertz": True, "rock.loading_exponent": 1.4}
+    found = run(solver, **rock)["drill"]
+    for name in ("crushing", "bit_impulse", "bit_velocity", "penetration"):
+        assert found[name] == pytest.approx(by_power[name], rel=1e-6), name
 
 
 @pytest.mark.parametrize("solver", COARSE)
