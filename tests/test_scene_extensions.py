@@ -112,6 +112,7 @@ SEAL = Component("seal", "seal", FRICTION.parameters, push)
         ({"lasts": push}, "lasts takes 3 arguments: must be 2"),
         ({"is_drive": True, "on_piston": None, "on_bit": push}, "a drive has a kernel on_piston"),
         ({"parameters": {"a": (3.0, "N", "F", 0.0, 1.0)}}, "a is 3.0 by default: must be from 0.0"),
+        ({"parameters": {"a": (3.0, "N", "F")}}, "a has 3 values: must be default, unit"),
         ({"inputs": ("force", "load")}, "inputs: load must be one of force"),
         ({"state": {"a": ("N", "F", "b")}}, "state: b must be one of force"),
         ({"of_blow": ("force",)}, "of_blow: force must be one of none"),
@@ -119,6 +120,9 @@ SEAL = Component("seal", "seal", FRICTION.parameters, push)
 )
 def test_what_is_wrong_with_a_component_is_told(changes, told):
     assert not SEAL.fault
+    assert SEAL._replace(stores=True).ledger == {
+        "seal": ("stored", "taken from the piston by seal")
+    }
     assert SEAL._replace(**changes).fault.startswith(told)
 
 

@@ -132,7 +132,7 @@ class Component(NamedTuple):
     @property
     def ledger(self) -> dict[str, tuple[Side, str]]:
         """Entries of the ledger, that of its force before others: side and meaning by name."""
-        taken = f"taken from the {' and the '.join(self.pushes)} by this force"
+        taken = f"taken from the {' and the '.join(self.pushes)} by {self.description}"
         is_own = self.pushes and not self.is_drive
         side: Side = "stored" if self.stores else "dissipated"
         of_force = {self.name: (side, taken)} if is_own else {}
@@ -155,7 +155,10 @@ class Component(NamedTuple):
             return "a drive has a kernel on_piston"
         if self.loading and self.needs.get("effects.rock") != ("power",):
             return 'with loading it needs {"effects.rock": ("power",)}'
-        for name, (default, _, _, lower, upper) in self.parameters.items():
+        for name, of in self.parameters.items():
+            if len(of) != 5:
+                return f"{name} has {len(of)} values: must be default, unit, description, limits"
+            default, _, _, lower, upper = of
             if default is not None and not lower <= default <= upper:
                 return f"{name} is {default!r} by default: must be from {lower!r} to {upper!r}"
         starts = {start for *_, start in self.state.values() if isinstance(start, str)}

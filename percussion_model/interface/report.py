@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from percussion_model.analysis.drill_string import Extreme
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
+from percussion_model.components import COMPONENTS
 from percussion_model.interface.pages import filled
 from percussion_model.interface.plotting import CAPTIONS, figures, watched_string
 from percussion_model.interface.plotting.window import (
@@ -104,6 +105,13 @@ CARDS = (
     ("penetration_per_blow", 1e3, "mm", "penetration per blow"),
 )
 
+
+def _entries_on(side: str) -> list[tuple[str, str]]:
+    """Entries of components on a side of the ledger, and what they are."""
+    entries = [entry for one in COMPONENTS for entry in one.ledger.items()]
+    return [(name, meaning) for name, (found, meaning) in entries if found == side]
+
+
 # Entries of the ledger in the order of the balance: initial + work = the rest.
 LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
@@ -115,7 +123,7 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("gravity", "work of gravity"),
             ("climb", "rotation, which lifts the bit out of craters"),
             ("refill", "cuttings that carry the bit"),
-            ("turning", "rotation against friction"),
+            *_entries_on("work"),
         ),
     ),
     (
@@ -126,9 +134,9 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("standstill", "damping at standstill (mode SS)"),
             ("loss", "structural loss in the bars"),
             ("contact", "restitution of rigid contact"),
-            ("friction", "friction of turning buttons"),
             ("joints", "joints of the drill string, and its damper"),
             ("ends", "ends without reflection, less what comes in there"),
+            *_entries_on("dissipated"),
             ("numerical", "numerical: averaging in cells"),
             ("overshoot", "overshoot: events found just past their place"),
         ),
@@ -139,6 +147,7 @@ LEDGER: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("kinetic", "kinetic"),
             ("elastic", "elastic, in the bars"),
             ("recoverable", "elastic, in the rock"),
+            *_entries_on("stored"),
         ),
     ),
     ("Unexplained", (("residual", "residual"),)),

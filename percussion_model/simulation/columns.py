@@ -107,7 +107,7 @@ ENERGY_COLUMNS = (
     Column("elastic", "J", "stored in strain at the end"),
     Column("recoverable", "J", "stored in the rock at the end"),
     Column("input", "J", "sum of drive, feed, gravity and what rotation does"),
-    Column("stored", "J", "sum of kinetic, elastic and recoverable"),
+    Column("stored", "J", "sum of kinetic, elastic, recoverable and what components store"),
     Column("dissipated", "J", "sum of all that is taken, but for numerical and overshoot"),
     Column("residual", "J", "what no entry explains"),
     Column("numerical_relative", "", "numerical, divided by the energy put in"),
