@@ -94,7 +94,7 @@ def rate_interval(
     plain = scene if scene.effects.string else scene.computed_by("rigid")
     own = _rate(plain)
     rates = []
-    for k, shares in enumerate(_shares(samples, len(numbers))):
+    for k, shares in enumerate(sample_shares(samples, len(numbers))):
         pairs = zip(numbers, shares, strict=True)
         rates.append(_rate(plain.replace(**{one.key: _within(one, share) for one, share in pairs})))
         if progress is not None:
@@ -106,7 +106,7 @@ def rate_interval(
     return RateInterval(name, low, high, len(known))
 
 
-def _shares(samples: int, numbers: int) -> list[list[float]]:
+def sample_shares(samples: int, numbers: int) -> list[list[float]]:
     """Samples in a box of side 1 that are spread evenly along each side, always the same."""
     random = np.random.default_rng(0)
     places = random.permuted(np.tile(np.arange(samples), (numbers, 1)), axis=1).T

@@ -33,8 +33,14 @@ def explore(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
     ] = True,
+    page: Annotated[
+        bool, typer.Option("--page", help="The page that needs no server, with its own hammers.")
+    ] = False,
 ) -> None:
     """Open a page on which rate, waves and forces of one blow follow sliders."""
+    if page:
+        _open_page(browser, is_own=bool(scene or settings or rock or bit or solver))
+        return
     from percussion_model.interface.progress import progress
 
     try:
@@ -59,6 +65,25 @@ def explore(
         )
     except KeyboardInterrupt:
         raise typer.Exit(common.print_message("ended", common.INTERRUPTED)) from None
+
+
+def _open_page(browser: bool, is_own: bool) -> None:
+    """Open the page that runs the hammer itself, a file."""
+    import webbrowser
+
+    from percussion_model.interface.explore_page.build import page_file
+
+    if is_own:
+        raise common.refusal("--page: has hammers, bits and rocks of its own: give no others")
+    try:
+        address = page_file().as_uri()
+    except FileNotFoundError as error:
+        raise common.refusal(
+            f"--page: {error}; `python -m percussion_model.engine.wasm` makes it"
+        ) from None
+    print(address, flush=True)
+    if browser:
+        webbrowser.open(address)
 
 
 def _scenes(

@@ -1,0 +1,175 @@
+"""One file from the sources of the page, the engine for browsers, and the package's tables."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from percussion_model.analysis.rock_interval import SAMPLES, sample_shares, uncertain_numbers
+from percussion_model.interface.plotting.window import TRANSITS_SHOWN
+from percussion_model.scene.bits import bit, bits
+from percussion_model.scene.hammers import AIR, hammer, hammers, with_chambers
+from percussion_model.scene.rocks import rock, rocks
+from percussion_model.scene.rocks.breaking import parameters_under
+from percussion_model.scene.scene import Scene
+from percussion_model.scene.writing import write_whole
+
+HERE = Path(__file__).parent
+NAME = "explore.html"
+# Files of the engine for browsers.
+ENGINE = ("engine.js", "engine.wasm", "table.json")
+# Modules of page and worker, each after those that it takes from.
+PAGE = ("words", "numbers", "scene", "pictures", "plot", "figures", "drawing", "inputs", "result",
+        "player", "main")  # fmt: skip
+WORKER = ("settle", "grid_error", "kept", "picture", "worker")
+# Pressure of air of the table's hammers with chambers [Pa].
+PRESSURE = 24e5
+# Bits that go with a hammer, by the diameter of its hole; the reference bores 3 1/4 inches.
+LEAST_HOLE, MOST_HOLE, REFERENCE_HOLE = 0.85, 1.35, 0.0826
+IMPORT = re.compile(r'^import \{(.*?)\} from "[./\w]*?(\w+)\.js";\n', re.M | re.S)
+# Most numbers of rock and bit that are known by intervals.
+MOST_UNCERTAIN = 8
+
+
+def engine_folder() -> Path:
+    """Where the engine for browsers is put: `dist/web` of a clone."""
+    return HERE.parents[2] / "dist" / "web"
+
+
+def page_file() -> Path:
+    """The page: as a wheel brings it, or else made of what is in a clone.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no engine for browsers.
+    """
+    brought, engine = HERE / NAME, engine_folder()
+    if brought.is_file():
+        return brought
+    if not all((engine / name).is_file() for name in ENGINE):
+        raise FileNotFoundError(f"{engine}: holds no engine for browsers")
+    file = engine / NAME
+    write_whole(file, page(engine))
+    return file
+
+
+def page(engine: Path) -> str:
+    """The whole page as HTML.
+
+    Parameters
+    ----------
+    engine : Path
+        Folder with the files of `ENGINE`.
+    """
+    script, wasm, table = (engine / name for name in ENGINE)
+    packed = gzip.compress(wasm.read_bytes(), 9, mtime=0)
+    own = script.read_text("utf-8")
+    parts = {
+        "STYLE": _source("style.css"),
+        "TABLE": _as_json(_less(json.loads(table.read_text("utf-8")))),
+        "CATALOGUE": _as_json(catalogue()),
+        "ENGINE": base64.b64encode(packed).decode(),
+        "WORKER": joined({"engine": own} | {name: _source(f"{name}.js") for name in WORKER}),
+        "PAGE": joined({"engine": own} | {name: _source(f"{name}.js") for name in PAGE}),
+    }
+    return re.sub(r"/\*([A-Z]+)\*/", lambda found: parts[found[1]], _source("index.html"))
+
+
+def _as_json(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+
+
+def _less(table: dict[str, Any]) -> dict[str, Any]:
+    """The table without what the page does not show."""
+    kept = {name for name, *_ in _hammers()}
+    return table | {
+        "presets": {name: one for name, one in table["presets"].items() if name in kept}
+    }
+
+
+def _source(name: str) -> str:
+    return (HERE / name).read_text("utf-8")
+
+
+def joined(modules: dict[str, str]) -> str:
+    """Modules by name, each after those that it takes from, as one script of scopes."""
+    taken: dict[str, set[str]] = {name: set() for name in modules}
+    for text in modules.values():
+        for names, source in IMPORT.findall(text):
+            taken[source] |= {one.strip() for one in names.split(",")}
+    scopes = []
+    for name, text in modules.items():
+        inside = IMPORT.sub(r"const {\1} = from_\2;\n", text)
+        inside = re.sub(r"^export ", "", inside, flags=re.M)
+        given = ", ".join(sorted(taken[name]))
+        scopes.append(f"const from_{name} = (() => {{\n{inside}\nreturn {{ {given} }};\n}})();\n")
+    return "".join(scopes)
+
+
+def catalogue() -> dict[str, Any]:
+    """What the page must know besides the engine's table."""
+    try:
+        own = version("percussion_model")
+    except PackageNotFoundError:
+        own = "0"
+    down = [name for name in bits() if name.startswith("dth")]
+    return {
+        "version": own,
+        "hammers": {name: _hammer(scene, title) for name, title, scene in _hammers()},
+        "bits": {name: _bit(name) for name in down},
+        "uncertain": {name: _uncertain(name) for name in down},
+        "shares": {count: sample_shares(SAMPLES, count) for count in range(1, MOST_UNCERTAIN + 1)},
+        "transits": TRANSITS_SHOWN,
+    }
+
+
+def _hammers() -> Iterator[tuple[str, str, Scene]]:
+    """Presets of the table with their titles."""
+    yield "reference", "Reference, 3¼ inch", Scene()
+    for scene, name in sorted(((hammer(name), name) for name in hammers()), key=_is_string):
+        title = scene.title.partition(",")[0].replace("Down-the-hole hammer of ", "Down the hole, ")
+        yield name, title, scene
+        if name in AIR:
+            yield f"{name} chambers", f"{title}, air", with_chambers(name, PRESSURE)
+
+
+def _is_string(one: tuple[Scene, str]) -> bool:
+    return one[0].effects.string
+
+
+def _hammer(scene: Scene, title: str) -> dict[str, Any]:
+    if scene.effects.string:
+        return {"title": title, "refused": True}
+    hole = scene.hole_diameter or REFERENCE_HOLE
+    return {
+        "title": title,
+        "air": scene.effects.drive == "pneumatic",
+        "toml": scene.to_toml(),
+        "hole": hole,
+        "transits": [scene.piston.transit_time, scene.bit.transit_time],
+        "bits": [name for name in bits() if name.startswith("dth")
+                 and LEAST_HOLE < bit(name).diameter / hole < MOST_HOLE],
+    }  # fmt: skip
+
+
+def _bit(name: str) -> dict[str, Any]:
+    one = bit(name)
+    count = round(one.buttons.value)
+    short = f"{1e3 * one.diameter:.0f} mm, {count} buttons"
+    return {"short": short, "diameter": one.diameter, "buttons": count, "gauge": one.gauge_buttons}
+
+
+def _uncertain(name: str) -> dict[str, list[tuple[str, float, float, float]]]:
+    """Numbers of each rock and a bit that are known by intervals: key, value, low and high."""
+    plain, found = Scene().replace(**bit(name).parameters), {}
+    for one in map(rock, rocks()):
+        _, numbers = uncertain_numbers(plain.replace(**parameters_under(one, plain)))
+        found[one.name] = [(n.key, n.value, n.low, n.high) for n in numbers]
+    return found

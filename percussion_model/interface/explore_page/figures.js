@@ -1,0 +1,187 @@
+// Plots of one blow, and of the rate over feed and rotation.
+import { Plot, colour } from "./plot.js";
+import { short, unitOf } from "./numbers.js";
+
+// Index of the last time that is not after t.
+export function before(times, t) {
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= t) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+// Value of a column between two times.
+export function at(times, values, t) {
+  const k = Math.min(before(times, t), times.length - 2), span = times[k + 1] - times[k];
+  const share = span > 0 ? Math.min(Math.max((t - times[k]) / span, 0), 1) : 0;
+  return values[k] + share * (values[k + 1] - values[k]);
+}
+
+// Colour of a stress by the greatest: blue for tension, grey for none, red for compression.
+export function stressColour(share) {
+  const s = Math.max(-1, Math.min(1, share)), rest = [214, 214, 214], end = s > 0 ? [190, 20, 30] : [20, 70, 200];
+  const part = Math.abs(s) ** 0.7;
+  return rest.map((one, k) => Math.round(one + part * (end[k] - one)));
+}
+
+export class Figures {
+  constructor(scrub, choose) {
+    const canvas = id => document.getElementById(id);
+    this.waves = new Plot(canvas("waves"), ms => scrub(1e-3 * ms));
+    this.forces = new Plot(canvas("forces"), ms => scrub(1e-3 * ms));
+    this.path = new Plot(canvas("path"));
+    this.energy = new Plot(canvas("energy"), ms => scrub(1e-3 * ms));
+    this.overFeed = new Plot(canvas("over-feed"), x => choose("feed.force", x));
+    this.overSpeed = new Plot(canvas("over-speed"), x => choose("rotation.speed", x));
+  }
+
+  // Plots of a blow between two times; pinned is another one or null.
+  draw(blow, pinned, [from, to], imperial) {
+    this.blow = blow;
+    this.imperial = imperial;
+    for (const plot of [this.waves, this.forces, this.path, this.energy]) plot.ink = undefined;
+    this.drawForces(blow, pinned, [1e3 * from, 1e3 * to]);
+    this.drawPath(blow, pinned);
+    this.drawWaves(blow, [1e3 * from, 1e3 * to]);
+    this.drawEnergy(blow, [1e3 * from, 1e3 * to]);
+  }
+
+  drawForces(blow, pinned, x) {
+    const [unit, factor] = unitOf("force", this.imperial), shown = [...(pinned ? [pinned] : []), blow];
+    const most = Math.max(...shown.map(one => one.greatest.bit_force), ...shown.map(one => one.greatest.contact_force)) || 1;
+    this.forces.begin(x, [0, 1.08 * factor * most], "time, ms", `force, ${unit}`);
+    for (const one of shown) {
+      for (const [column, name] of [["contact_force", "contact"], ["bit_force", "rock"]]) {
+        const points = Array.from(one.time, (t, k) => [1e3 * t, factor * one.columns[column][k]]);
+        this.forces.line(points, one === blow ? name : "grey", one === blow ? 1.7 : 1.2, one === blow ? [] : [4, 3]);
+      }
+    }
+  }
+
+  drawPath(blow, pinned) {
+    const [unit, factor] = unitOf("force", this.imperial), [short, length] = unitOf("length", this.imperial);
+    const shown = [...(pinned ? [pinned] : []), blow];
+    const all = shown.map(one => one.depth).map(d => [Math.min(...d), Math.max(...d)]);
+    const low = length * Math.min(...all.map(one => one[0])), high = length * Math.max(...all.map(one => one[1]));
+    const room = 0.05 * (high - low || 1), most = Math.max(...shown.map(one => one.greatest.bit_force)) || 1;
+    this.path.begin([low - room, high + room], [0, 1.08 * factor * most], `depth of the bit's end, ${short}`, `force on the rock, ${unit}`);
+    for (const one of shown) {
+      const points = Array.from(one.depth, (d, k) => [length * d, factor * one.columns.bit_force[k]]);
+      this.path.line(points, one === blow ? "rock" : "grey", one === blow ? 1.7 : 1.2, one === blow ? [] : [4, 3]);
+    }
+  }
+
+  // Stress over time and depth, piston above bit.
+  drawWaves(blow, x) {
+    const [unit, factor] = unitOf("length", this.imperial), height = blow.fields.reduce((sum, one) => sum + one.edges.at(-1), 0);
+    this.waves.begin(x, [factor * height, 0], "time, ms", `place, ${unit}`);
+    if (!blow.fields.length) return;
+    const pen = this.waves.pen, wide = Math.max(Math.round(this.waves.right - this.waves.left), 2);
+    let top = 0;
+    for (const field of blow.fields) {
+      const cells = field.edges.length - 1, rows = 4 * cells, image = new ImageData(wide, rows);
+      for (let column = 0; column < wide; column++) {
+        const t = 1e-3 * (x[0] + (column + 0.5) / wide * (x[1] - x[0])), k = before(field.time, t);
+        for (let row = 0; row < rows; row++) {
+          const depth = (row + 0.5) / rows * field.edges.at(-1), cell = before(field.edges, depth);
+          image.data.set([...stressColour(field.stress[k * cells + cell] / blow.greatest.stress), 255], 4 * (row * wide + column));
+        }
+      }
+      const patch = new OffscreenCanvas(wide, rows), y = this.waves.py(factor * top), end = this.waves.py(factor * (top + field.edges.at(-1)));
+      patch.getContext("2d").putImageData(image, 0, 0);
+      pen.drawImage(patch, this.waves.left, y, this.waves.right - this.waves.left, end - y);
+      top += field.edges.at(-1);
+    }
+    const [first] = blow.fields;
+    this.waves.line([[x[0], factor * first.edges.at(-1)], [x[1], factor * first.edges.at(-1)]], "ink", 1);
+  }
+
+  // Energies over time, one on the other.
+  drawEnergy(blow, x) {
+    const [unit, factor] = unitOf("energy", this.imperial), most = Math.max(...blow.energies.at(-1).sum) || 1;
+    this.energy.begin(x, [0, 1.3 * factor * most], "time, ms", `energy, ${unit}`);
+    const pen = this.energy.pen, place = this.energy;
+    pen.save();
+    pen.beginPath();
+    pen.rect(place.left, place.top, place.right - place.left, place.bottom - place.top);
+    pen.clip();
+    for (const one of [...blow.energies].reverse()) {
+      pen.beginPath();
+      pen.moveTo(place.px(1e3 * blow.time[0]), place.py(0));
+      blow.time.forEach((t, k) => pen.lineTo(place.px(1e3 * t), place.py(factor * one.sum[k])));
+      pen.lineTo(place.px(1e3 * blow.time.at(-1)), place.py(0));
+      pen.fillStyle = colour(one.colour);
+      pen.fill();
+    }
+    pen.restore();
+    let left = place.left + 0.4 * place.font;
+    pen.textBaseline = "middle";
+    for (const one of blow.energies) {
+      pen.fillStyle = colour(one.colour);
+      pen.fillRect(left, place.top + 0.35 * place.font, 0.8 * place.font, 0.8 * place.font);
+      pen.fillStyle = colour("ink");
+      pen.fillText(one.name, left + 1.1 * place.font, place.top + 0.8 * place.font);
+      left += 1.8 * place.font + pen.measureText(one.name).width;
+    }
+  }
+
+  // A cursor through all plots.
+  frame(t) {
+    for (const plot of [this.waves, this.forces, this.energy]) plot.frame(1e3 * t);
+    const blow = this.blow;
+    if (!blow) return;
+    const depth = unitOf("length", this.imperial)[1] * at(blow.time, blow.depth, t);
+    this.path.frame(depth, unitOf("force", this.imperial)[1] * at(blow.time, blow.columns.bit_force, t));
+  }
+
+  // Rate over one setting, with a dot where the hammer is.
+  drawRates(plot, curve, now, kind, name, imperial) {
+    const [unit, factor] = unitOf(kind, imperial), [per, rate] = unitOf("rate", imperial);
+    const known = curve.points.filter(([, y]) => Number.isFinite(y));
+    const most = rate * Math.max(...known.map(([, y]) => y), now[1] || 0, 1e-9);
+    plot.ink = undefined;
+    plot.begin([factor * curve.low, factor * curve.high], [0, 1.12 * most], `${name}, ${unit}`, `rate, ${per}`);
+    plot.line(known.map(([x, y]) => [factor * x, rate * y]), "third", 1.8);
+    plot.frame(factor * now[0], Number.isFinite(now[1]) ? rate * now[1] : 0);
+    plot.canvas.setAttribute("aria-label", `${name}: ${known.map(([x, y]) => `${short(factor * x, 3)} ${unit} ${short(rate * y, 3)} ${per}`).join(", ")}`);
+  }
+}
+
+// What a picture of the worker lacks: greatest values, depths and energies.
+export function prepared(blow, scene) {
+  const { columns, time } = blow, greatest = {};
+  for (const name of ["bit_force", "contact_force"]) greatest[name] = columns[name].reduce((a, b) => Math.max(a, b), 0);
+  greatest.stress = blow.fields.reduce((most, one) => one.stress.reduce((a, b) => Math.max(a, Math.abs(b)), most), 1);
+  const start = columns.bit_end_position[before(time, 0)], depth = columns.bit_end_position.map(one => one - start);
+  const bars = [scene.preset.piston, scene.preset.bit], [piston] = bars.map(bar => bar.reduce((sum, [length, area, , density]) => sum + length * area * density, 0));
+  let work = 0;
+  const rock = Float64Array.from(time, (_, k) => {
+    if (k) work += 0.5 * (columns.bit_force[k] + columns.bit_force[k - 1]) * (depth[k] - depth[k - 1]);
+    return work;
+  });
+  const strain = Float64Array.from(time, t => blow.fields.reduce((sum, one, which) => sum + strainEnergy(one, bars[which], t), 0));
+  const parts = [
+    ["rock", "grey", rock], ["strain", "contact", strain], ["bit", "third", columns.bit_kinetic_energy],
+    ["piston", "rock", columns.piston_velocity.map(v => 0.5 * piston * v * v)],
+  ];
+  let sum = new Float64Array(time.length);
+  const energies = parts.map(([name, colourName, values]) => {
+    sum = sum.map((one, k) => one + Math.max(values[k], 0));
+    return { name, colour: colourName, values, sum };
+  });
+  return { ...blow, greatest, depth, energies };
+}
+
+// Elastic energy of a bar at a time, by its stress [J].
+function strainEnergy(field, sections, t) {
+  const cells = field.edges.length - 1, k = before(field.time, t);
+  let total = 0, section = 0, end = sections[0][0];
+  for (let cell = 0; cell < cells; cell++) {
+    const middle = 0.5 * (field.edges[cell] + field.edges[cell + 1]), stress = field.stress[k * cells + cell];
+    while (middle > end && section < sections.length - 1) end += sections[++section][0];
+    total += 0.5 * stress * stress / sections[section][2] * sections[section][1] * (field.edges[cell + 1] - field.edges[cell]);
+  }
+  return total;
+}

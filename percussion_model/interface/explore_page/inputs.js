@@ -1,0 +1,118 @@
+// Cards of hammers, bits and rocks, and sliders with a field each.
+import { short, unitOf } from "./numbers.js";
+import { bitPicture, hammerPicture, rockPicture } from "./pictures.js";
+import { OTHERS, SLIDERS, WORDS } from "./words.js";
+
+const STEPS = 400;
+
+function escaped(text) {
+  return text.replace(/[&<>"]/g, letter => `&#${letter.charCodeAt(0)};`);
+}
+
+// Titles of rocks that fit a card.
+function shorter(title) {
+  return title.replace("Granite of a continuum model", "Model granite").replace(", by its strength", "").replace(" of the reference scene", "");
+}
+
+// Cards of one group: names with pictures and titles; refused ones say why.
+function cards(box, group, options, chosen, choose) {
+  box.innerHTML = options.map(({ name, title, picture, refused }) =>
+    `<label${refused ? ` title="${escaped(refused)}"` : ""}><input type="radio" name="${group}" value="${escaped(name)}"${name === chosen ? " checked" : ""}${refused ? " disabled" : ""}>` +
+    `${picture}<span>${escaped(title)}${refused ? `: ${escaped(refused)}` : ""}</span></label>`).join("");
+  box.onchange = event => choose(event.target.value);
+}
+
+export class Inputs {
+  // change: takes a scene. The scene is read by get.
+  constructor(get, change) {
+    Object.assign(this, { get, change, imperial: false, entries: [] });
+    this.boxes = ["hammers", "bits", "rocks"].map(id => document.getElementById(id));
+    for (const [id, rows] of [["sliders", SLIDERS], ["others", OTHERS]]) {
+      for (const row of rows) this.entries.push(new Entry(row, document.getElementById(id), this));
+    }
+  }
+
+  // Show a scene: cards that fit, sliders where they are.
+  show() {
+    const scene = this.get(), { hammers, bits, rocks } = scene.tables;
+    const focused = document.activeElement?.name, own = scene.base, ownBit = scene.preset.bit_name;
+    const change = values => this.change(Object.assign(scene.with({}), values));
+    for (const entry of this.entries) entry.show(scene, this.imperial);
+    const chosen = [scene.hammer, scene.bit, scene.rock].join();
+    if (chosen === this.chosen) return;
+    this.chosen = chosen;
+    cards(this.boxes[0], "hammer", Object.entries(hammers).map(([name, one]) =>
+      ({ name, title: one.title, picture: hammerPicture(scene.tables.presets[name], one), refused: one.refused && WORDS.needsServer })),
+      scene.hammer, name => change({ hammer: name, bit: hammers[name].bits.includes(scene.bit) ? scene.bit : scene.tables.presets[name].bit_name, values: {} }));
+    const free = ownBit ? [] : [{ name: "", title: WORDS.given, picture: bitPicture({ diameter: own.hole, buttons: 9, gauge: 6 }) }];
+    cards(this.boxes[1], "bit", [...free, ...own.bits.map(name => ({ name, title: bits[name].short, picture: bitPicture(bits[name]) }))],
+      scene.bitName, name => change({ bit: name, values: this.without(["breaking.", "rotation."]) }));
+    cards(this.boxes[2], "rock", [{ name: "", title: WORDS.given, picture: rockPicture("hard") },
+      ...Object.entries(rocks).map(([name, one]) => ({ name, title: one.title, picture: rockPicture(name) }))].map(one => ({ ...one, title: shorter(one.title) })),
+      scene.rock, name => change({ rock: name, values: this.without(["rock.", "breaking.crushing_energy"]) }));
+    for (const box of this.boxes) {
+      const own = box.querySelector("input:checked")?.parentNode;
+      if (own) box.scrollLeft = own.offsetLeft - 0.5 * (box.clientWidth - own.clientWidth);
+    }
+    if (["hammer", "bit", "rock"].includes(focused)) document.querySelector(`input[name=${focused}]:checked`)?.focus();
+  }
+
+  // Changed values less those of a group.
+  without(groups) {
+    return Object.fromEntries(Object.entries(this.get().values).filter(([key]) => !groups.some(group => key.startsWith(group))));
+  }
+
+  set(key, value) {
+    this.change(this.get().with({ [key]: value }));
+  }
+}
+
+// A slider and a field; the field takes what the slider does not reach.
+class Entry {
+  constructor(row, box, inputs) {
+    Object.assign(this, { ...row, inputs });
+    const id = `in-${row.key.replace(".", "-")}`;
+    this.box = document.createElement("div");
+    this.box.className = "slider";
+    this.box.innerHTML = `<label for="${id}">${escaped(row.name)}</label><span class="field"><input type="text" inputmode="decimal" autocomplete="off" aria-describedby="${id}-why"><span class="unit"></span></span>` +
+      `<input type="range" id="${id}" step="any"><p id="${id}-why" role="alert" class="refusal" hidden></p>`;
+    [this.field, this.range] = this.box.querySelectorAll("input");
+    this.note = this.box.querySelector("p");
+    box.append(this.box);
+    this.range.addEventListener("input", () => this.take(Number(this.range.value) / this.factor));
+    this.field.addEventListener("change", () => {
+      const text = this.field.value.trim().replace(",", "."), value = text === "" ? NaN : Number(text);
+      this.take(value / this.factor, this.field.value);
+    });
+  }
+
+  show(scene, imperial) {
+    const drive = scene.get("effects.drive");
+    const shown = (!this.drive || this.drive === drive) && (!this.needs || scene.get(this.needs)) && (!this.on || scene.get("feed.on") === this.on);
+    this.box.hidden = !shown;
+    this.box.style.display = shown ? "" : "none";
+    [this.short, this.factor] = unitOf(this.unit, imperial);
+    const value = scene.get(this.key), low = Math.min(this.low, value), high = Math.max(this.high, value);
+    Object.assign(this.range, { min: this.factor * low, max: this.factor * high, step: (this.factor * (high - low)) / STEPS });
+    if (document.activeElement !== this.range) this.range.value = this.factor * value;
+    this.field.value = short(this.factor * value, 4);
+    this.field.setAttribute("aria-label", `${this.name}, ${this.short}`);
+    this.range.setAttribute("aria-valuetext", `${this.field.value} ${this.short}`);
+    this.range.title = scene.tables.rows.get(this.key).description;
+    this.box.querySelector(".unit").textContent = this.short;
+    this.refuse("");
+  }
+
+  // Take a value [SI], of the slider to four digits; text is what was written.
+  take(value, text) {
+    const exact = text === undefined ? Number((this.factor * value).toPrecision(4)) / this.factor : value;
+    const clean = Number(exact.toPrecision(12)), why = this.inputs.get().refuse(this.key, clean, text);
+    if (why) this.refuse(why); else this.inputs.set(this.key, clean);
+  }
+
+  refuse(why) {
+    this.note.hidden = !why;
+    this.note.textContent = why;
+    this.field.setAttribute("aria-invalid", String(Boolean(why)));
+  }
+}

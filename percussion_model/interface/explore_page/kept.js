@@ -1,0 +1,55 @@
+// Tables that equal scenes share, kept from wish to wish: most of the time to create a motion.
+
+const MOST = 12, WORD = 8, ROOM = 64;
+
+// Let an engine keep the motions whose tables others use.
+export function keepTables(engine) {
+  const { table } = engine, kept = new Map(), room = engine.allocate(ROOM);
+  const keyOf = (solver, image) => {
+    const count = engine.entries[solver].table_key(image, room);
+    if (count === 0) return "";
+    const head = Array.from(engine.words(image, table.image.counts), Number), first = table.image.counts + head[2];
+    const sections = engine.numbers(image + WORD * (first + table.parameters.length), 4 * (head[0] + head[1]));
+    const model = engine.words(image, first + table.parameters.length)[first + engine.rows.get("piston.model").word];
+    return [solver, head, sections.join(), model, engine.numbers(room, count).join()].join(";");
+  };
+  for (const [solver, entries] of Object.entries(engine.entries)) {
+    const create = entries.create;
+    entries.create = (image, bar, place) => {
+      const key = keyOf(solver, image);
+      if (!key) return create(image, bar, place, 0);
+      let like = kept.get(key);
+      kept.delete(key);
+      like ??= create(image, table.gauge_bars.none, 0, 0);
+      if (like === 0) return 0;
+      kept.set(key, like); // the last that was used
+      if (kept.size > MOST) {
+        const [oldest] = kept.keys();
+        engine.free(kept.get(oldest));
+        kept.delete(oldest);
+      }
+      return create(image, bar, place, like);
+    };
+  }
+  return engine;
+}
+
+// Let a motion keep the shapes of its modes, which else are made for each reading; a function that
+// ends it.
+export function keepShapes({ engine, entries, _image: own }) {
+  const make = entries.shapes, made = new Map();
+  entries.shapes = (image, bar, form, out) => {
+    if (image !== own) return make(image, bar, form, out);
+    const key = `${bar} ${form}`, words = 2 * entries.cells(image, bar, 0, 0);
+    if (!made.has(key)) {
+      const modes = make(image, bar, form, 0), room = engine.allocate(words * modes);
+      make(image, bar, form, room);
+      made.set(key, { modes, numbers: engine.numbers(room, words * modes).slice() });
+      engine.free(room);
+    }
+    const { modes, numbers } = made.get(key);
+    if (out) engine.numbers(out, numbers.length).set(numbers);
+    return modes;
+  };
+  return () => { entries.shapes = make; };
+}

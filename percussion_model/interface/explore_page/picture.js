@@ -1,0 +1,82 @@
+// One blow at full rate: what a sample has, and the stress in both bars.
+import { keepShapes } from "./kept.js";
+
+const STEPS = 24, BUSY_SAMPLES = 1600, QUIET_SAMPLES = 500, BEFORE = 0.02, PATIENCE = 4, PIECE = 200;
+
+// The state of a motion, to come back to.
+function saved(motion) {
+  const { engine, moving, _size: size, time } = motion, words = engine.words(moving, size).slice(), count = motion.blows.length;
+  return () => {
+    engine.words(moving, size).set(words);
+    motion.time = time;
+    motion.blows.length = count;
+  };
+}
+
+// The next whole blow of a motion, which is left as it was; null where there is none.
+export async function picture(motion, { scene, busy: longest, known }, keep) {
+  const restore = saved(motion), count = motion.blows.length;
+  try {
+    motion.runBlows(2, motion.time + PATIENCE);
+    const blow = motion.blows.length > count + 1 ? motion.blows.at(-1) : null;
+    if (!blow) return null;
+    restore();
+    const busy = Math.min(blow.period, longest), start = Math.max(blow.time - BEFORE * blow.period, motion.time);
+    const even = (from, length, many) => Array.from({ length: many }, (_, k) => from + k / many * length);
+    const times = [...even(start, blow.time - start, 20), ...even(blow.time, busy, BUSY_SAMPLES),
+      ...(busy < blow.period ? even(blow.time + busy, blow.period - busy, QUIET_SAMPLES) : []), blow.time + blow.period];
+    const columns = await sampled(motion, times, keep);
+    restore();
+    const fields = await stresses(motion, scene, blow, times, busy, Math.min(...known.transits) / STEPS, keep);
+    return { time: Float64Array.from(times, t => t - blow.time), columns, fields, period: blow.period, busy };
+  } finally {
+    restore();
+  }
+}
+
+// Samples in pieces.
+async function sampled(motion, times, keep) {
+  const columns = {};
+  for (let done = 0; done < times.length; done += PIECE) {
+    for (const [name, values] of Object.entries(motion.sample(times.slice(done, done + PIECE)))) {
+      columns[name] ??= new Float64Array(times.length);
+      columns[name].set(values, done);
+    }
+    await keep();
+  }
+  return columns;
+}
+
+// Stress at some of the times: all steps of a wave while it is busy, few later.
+async function stresses(motion, scene, blow, times, busy, step, keep) {
+  let next = -Infinity, count = 0;
+  const chosen = times.filter(t => t >= next && (next = t + (t < blow.time + busy ? step : 0)) > -Infinity);
+  const found = new Map(), release = keepShapes(motion);
+  try {
+    for (const t of chosen) {
+      for (const [bar, { place, force }] of Object.entries(motion.fields(t))) {
+        if (!found.has(bar)) found.set(bar, { ...cellsOf(scene[bar], place), time: new Float64Array(chosen.length), stress: new Float32Array(chosen.length * place.length) });
+        const { areas, time, stress } = found.get(bar);
+        time[count] = t - blow.time;
+        stress.set(force.map((one, cell) => one / areas[cell]), count * place.length);
+      }
+      count += 1;
+      await keep();
+    }
+  } finally {
+    release();
+  }
+  return [...found.values()];
+}
+
+// Ends of the cells of a bar by their middles, and their areas.
+function cellsOf(sections, middles) {
+  const edges = [0], areas = [];
+  let end = 0, section = -1;
+  for (const middle of middles) {
+    while (middle > end && section < sections.length - 1) end += sections[++section][0];
+    areas.push(sections[section][1]);
+    edges.push(2 * middle - edges.at(-1));
+  }
+  return { edges: Float64Array.from(edges), areas };
+}

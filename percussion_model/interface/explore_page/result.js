@@ -1,0 +1,63 @@
+// The result in words and numbers, with both errors.
+import { inDigits, isUndecided, meanText, ratePair, unitOf } from "./numbers.js";
+import { NUMBERS, WORDS, fill } from "./words.js";
+
+const part = id => document.getElementById(id);
+
+// How the blows follow each other, in a sentence.
+export function motionWords(found) {
+  const { kind, order, counted } = found;
+  const said = kind === "periodic" ? (order === 1 ? WORDS.kinds.once : fill(WORDS.kinds.cycle, { n: order }))
+    : fill(WORDS.kinds[kind], { n: counted });
+  return said + (found.same === true ? WORDS.sameMotion : found.same === false ? WORDS.otherMotion : "");
+}
+
+export function rateText(found, imperial, kind = "rate") {
+  const [unit, factor] = unitOf(kind, imperial), { rate, errors } = found;
+  if (!Number.isFinite(rate)) return ["–", ""];
+  const [value, error] = ratePair(rate, errors?.rate_of_penetration, factor);
+  if (errors && isUndecided(rate, errors.rate_of_penetration)) return [WORDS.undecided, `${value} ± ${error} ${unit}`];
+  return [`${value} ${unit}`, error && `${error} ${unit}`];
+}
+
+// Numbers of a response by name: text with unit.
+export function numberTexts(found, imperial) {
+  const shown = [];
+  const [slow] = rateText(found, imperial, "slow"), [, behind] = rateText(found, imperial, "slow");
+  if (Number.isFinite(found.rate)) shown.push(["Rate", behind && !slow.startsWith(WORDS.undecided) ? `${slow.replace(/ \S+$/, "")} ± ${behind}` : slow]);
+  for (const [key, name, kind] of NUMBERS) {
+    const value = found.means?.[key];
+    if (!Number.isFinite(value)) continue;
+    const [unit, factor] = unitOf(kind, imperial);
+    shown.push([name, `${meanText(value, found.errors?.[key], factor)} ${unit}`]);
+  }
+  return shown;
+}
+
+export function showResult(found, pinned, imperial) {
+  const section = part("result");
+  section.classList.remove("waiting");
+  part("refusal").hidden = !found.refusal;
+  part("refusal").textContent = found.refusal ?? "";
+  if (found.refusal) {
+    part("rate").textContent = "–";
+    for (const id of ["numerical", "motion", "rock-error", "numbers"]) part(id).textContent = "";
+    return;
+  }
+  const [rate, error] = rateText(found, imperial);
+  part("rate").textContent = rate;
+  part("numerical").textContent = !Number.isFinite(found.rate) ? "" : found.errors ? (error ? fill(WORDS.numerical, { error }) : found.errors.rate_of_penetration === undefined ? WORDS.errorUnknown : "") : WORDS.noError;
+  part("motion").textContent = motionWords(found);
+  part("rock-error").textContent = rockWords(found, imperial);
+  const others = new Map(pinned ? numberTexts(pinned, imperial) : []);
+  part("numbers").innerHTML = numberTexts(found, imperial).map(([name, text]) =>
+    `<div><dt>${name}</dt><dd>${text}</dd>${others.has(name) ? `<dd class="pinned">${others.get(name)}</dd>` : ""}</div>`).join("");
+}
+
+function rockWords(found, imperial) {
+  if (!Number.isFinite(found.rate)) return "";
+  if (typeof found.interval === "string") return found.interval;
+  if (!found.interval) return "";
+  const [unit, factor] = unitOf("rate", imperial), [low, high] = found.interval.ends.map(end => inDigits(factor * found.rate * end, 2));
+  return fill(WORDS.rockError, { low, high: `${high} ${unit}`, rock: found.interval.rock });
+}

@@ -1,0 +1,93 @@
+// All words of the page that do not come from the table of parameters.
+
+export const WORDS = {
+  kinds: {
+    once: "Every blow is alike.",
+    cycle: "The motion repeats after {n} blows.",
+    aperiodic: "The blows do not repeat: numbers are means over {n} blows.",
+    settling: "So far, after {n} blows; they are not yet alike.",
+    stalled: "The blows have ceased: there is no rate.",
+  },
+  sameMotion: " A coarser computation finds the same.",
+  otherMotion: " A coarser computation finds another motion: take care.",
+  undecided: "undecided",
+  numerical: "± {error} by the computation",
+  noError: "error of the computation: being estimated …",
+  errorUnknown: "error of the computation not known",
+  rockError: "{low} to {high} by what is known of {rock} and bit; drills differ further, up to a factor 2 without a calibration on site.",
+  rockMissing: "What the rock leaves open is told for a bit that breaks rock: choose one.",
+  rockWaiting: "What the rock leaves open is being sampled …",
+  rockOwn: "These rock numbers have no name: nothing is known of their error.",
+  pinned: "Small grey numbers: pinned, {name}.",
+  copied: "Copied.",
+  notCopied: "Not copied: the browser does not allow it.",
+  play: "Play", pause: "Pause",
+  light: "Light", dark: "Dark", metric: "Metric units", imperial: "Imperial units",
+  pin: "Pin to compare", unpin: "Remove pinned",
+  needsServer: "rods, by percussion run",
+  given: "as given",
+  tooLong: "No stationary response within {seconds} s of computing, which is the limit here: percussion settled of this scene may take longer.",
+  drawn: "Piston, bit and rock in slow motion. Greatest stress {mega} MPa, greatest force on the rock {force} kN.",
+  plotted: "{what}. The blow lasts {period} ms; greatest force on the rock {force} kN, greatest stress {mega} MPa.",
+  engine: "This browser cannot run the engine: {why}",
+  oldLink: "This link was made by version {theirs}; this page is version {ours}. Numbers may differ.",
+  badLink: "In the link, {why}",
+  about: "percussion_model {version}. Piston and bit are elastic bars, the rock follows a law with memory. All is computed on this machine; nothing is sent.",
+  compression: "compression", tension: "tension",
+  drive: "drive", feed: "feed",
+  magnified: "bit motion × {n}",
+};
+
+// Sliders: key of the table, name, kind of unit, where it reaches [SI], and when it is shown.
+export const SLIDERS = [
+  { key: "feed.force", name: "Feed", unit: "force", low: 0, high: 20e3 },
+  { key: "drive.force", name: "Drive force on the piston", unit: "force", low: 500, high: 20e3, drive: "pressure" },
+  { key: "pneumatic.supply_pressure", name: "Air pressure", unit: "pressure", low: 4e5, high: 35e5, drive: "pneumatic" },
+  { key: "drive.reversal_distance", name: "Stroke: where the drive turns", unit: "length", low: 0.005, high: 0.1, drive: "pressure" },
+  { key: "rotation.speed", name: "Rotation", unit: "turns", low: 0, high: 15.7, needs: "effects.rotation" },
+];
+export const OTHERS = [
+  { key: "rock.loading_stiffness", name: "Rock stiffness, loading", unit: "stiffness", low: 1e8, high: 3e9 },
+  { key: "rock.unloading_ratio", name: "Unloading by loading stiffness", unit: "ratio", low: 1.1, high: 20 },
+  { key: "rock.barrier_energy", name: "Energy barrier", unit: "energy", low: 0, high: 0.5 },
+  { key: "breaking.crushing_energy", name: "Crushing energy", unit: "specific", low: 10e6, high: 150e6, needs: "effects.breaking" },
+  { key: "loss.time", name: "Loss time of steel", unit: "microseconds", low: 5e-8, high: 2e-6 },
+  { key: "feed.casing_mass", name: "Mass of the casing", unit: "mass", low: 0, high: 300, on: "casing" },
+];
+
+// Numbers beside the rate: key, name, kind of unit.
+export const NUMBERS = [
+  ["blow_frequency", "Blow frequency", "frequency"],
+  ["impact_velocity", "Impact velocity", "speed"],
+  ["transfer_efficiency", "Energy into the rock", "share"],
+  ["percussive_power", "Percussive power", "power"],
+  ["specific_energy", "Specific energy", "specific"],
+  ["blow_period", "Blow period", "milliseconds"],
+];
+
+// Kinds of unit: [unit, factor from SI] metric and imperial.
+const same = (unit, factor) => [[unit, factor], [unit, factor]];
+export const UNITS = {
+  rate: [["m/h", 3600], ["ft/h", 3600 / 0.3048]],
+  slow: [["mm/s", 1e3], ["in/min", 60 / 0.0254]],
+  force: [["kN", 1e-3], ["lbf", 1 / 4.4482216152605]],
+  pressure: [["bar", 1e-5], ["psi", 1 / 6894.757293168]],
+  length: [["mm", 1e3], ["in", 1 / 0.0254]],
+  turns: same("rpm", 30 / Math.PI),
+  stiffness: [["kN/mm", 1e-6], ["klbf/in", 1 / 175126.83524647]],
+  ratio: same("", 1),
+  energy: [["J", 1], ["ft·lbf", 1 / 1.3558179483314]],
+  specific: [["MJ/m³", 1e-6], ["kpsi", 1 / 6894757.293168]],
+  microseconds: same("µs", 1e6), milliseconds: same("ms", 1e3),
+  mass: [["kg", 1], ["lb", 1 / 0.45359237]],
+  frequency: same("Hz", 1),
+  speed: [["m/s", 1], ["ft/s", 1 / 0.3048]],
+  share: same("%", 100),
+  power: [["kW", 1e-3], ["hp", 1 / 745.69987158227]],
+  stress: [["MPa", 1e-6], ["kpsi", 1 / 6894757.293168]],
+};
+
+// Fill named places of a text.
+export function fill(text, values) {
+  return text.replace(/\{(\w+)\}/g, (_, name) => values[name]);
+}

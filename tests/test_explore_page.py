@@ -1,0 +1,236 @@
+"""The page that runs the hammer: its numbers are the package's, and it survives what users do."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+
+import pytest
+
+from percussion_model.analysis.stationary import settled
+from percussion_model.interface.explore_page.build import ENGINE, engine_folder, page
+from percussion_model.scene.bits import bit
+from percussion_model.scene.hammers import hammer
+from percussion_model.scene.rocks import rock, rocks
+from percussion_model.scene.rocks.breaking import parameters_under
+from percussion_model.scene.scene import Scene
+from percussion_model.simulation.driller_numbers import driller_text
+from percussion_model.simulation.uncertain import mean_text
+from tests.browser import browser, find_browser, tab
+
+pytest.importorskip("tornado", reason="a browser is driven through tornado, which comes with bokeh")
+FOLDER = engine_folder()
+pytestmark = [
+    pytest.mark.skipif(
+        find_browser() is None, reason="no Chromium is installed to open pages with"
+    ),
+    pytest.mark.skipif(
+        any(not (FOLDER / name).is_file() for name in ENGINE),
+        reason=f"no engine for browsers in {FOLDER}: python -m percussion_model.engine.wasm",
+    ),
+]
+SETTINGS, SURVIVED = 12, 60
+HAMMERS = {
+    "reference": ("dth-90",),
+    "dth3": ("dth-90",),
+    "dth4": ("dth-115",),
+    "dth5": ("dth-140",),
+}
+# What the page shows of a response, and how a test waits for it.
+SHOWN = "(explorer.state.found && explorer.state.shown === explorer.state.asked)"
+WITH_ERRORS = f"{SHOWN} && (explorer.state.found.refusal || explorer.state.found.errors || null)"
+ROW = (
+    "[...document.querySelectorAll('#numbers div')]"
+    ".map(one => [one.children[0].textContent, one.children[1].textContent])"
+)
+NUMBERS = {
+    "Blow frequency": ("blow_frequency", 1.0, "Hz"),
+    "Impact velocity": ("impact_velocity", 1.0, "m/s"),
+    "Energy into the rock": ("transfer_efficiency", 100.0, "%"),
+    "Percussive power": ("percussive_power", 1e-3, "kW"),
+    "Specific energy": ("specific_energy", 1e-6, "MJ/m³"),
+    "Blow period": ("blow_period", 1e3, "ms"),
+}
+# Moves of chance, faster than answers.
+MOVES = """
+(async () => {
+  let seed = 42;
+  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
+  const {tables, Scene, show} = explorer, any = list => list[Math.floor(random() * list.length)];
+  const hammers = Object.keys(tables.hammers).filter(one => !tables.hammers[one].refused);
+  for (let k = 0; k < COUNT; k++) {
+    const hammer = any(hammers), rock = any(Object.keys(tables.rocks));
+    show(new Scene(tables, hammer, any(tables.hammers[hammer].bits), rock, {
+      "feed.force": 2e4 * random(), "rock.barrier_energy": random(),
+      "rock.loading_stiffness": 3e9 * random(), "loss.time": 1e-5 * random() ** 4,
+      "drive.reversal_distance": 0.1 * random(), "rotation.speed": 30 * random(),
+    }));
+    await new Promise(done => setTimeout(done, WAIT * random()));
+  }
+  show(new Scene(tables, "reference"));
+  return true;
+})()
+"""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The page as a file."""
+    file = tmp_path_factory.mktemp("page") / "explore.html"
+    file.write_text(page(FOLDER), encoding="utf-8")
+    return file
+
+
+def opened(built, folder, use, fragment="", width=1280):
+    """What `use` returns of a tab with the page, which must ask for nothing and find no fault."""
+
+    async def visit():
+        with browser(folder / "profile") as port:
+            async with tab(port) as one:
+                await one.open(f"{built.as_uri()}{fragment}", width)
+                await one.until(SHOWN)
+                answer = await use(one)
+                assert one.found.errors == []
+                assert [
+                    at
+                    for at in one.found.requests
+                    if not at.startswith(("file:", "blob:", "data:"))
+                ] == []
+                return answer
+
+    return asyncio.run(visit())
+
+
+def random_settings(seed):
+    """Names and values of a scene: as a link of the page, and as a scene of the package."""
+    chance = random.Random(seed)
+    name = chance.choice(list(HAMMERS))
+    values = {
+        "feed.force": round(chance.uniform(1e3, 15e3)),
+        "drive.force": round(chance.uniform(2e3, 14e3)),
+        "rock.barrier_energy": round(chance.uniform(0.02, 0.2), 3),
+    }
+    head, stone = chance.choice(HAMMERS[name]), chance.choice(rocks())
+    scene = Scene() if name == "reference" else hammer(name)
+    scene = scene.replace(**bit(head).parameters)
+    scene = scene.replace(**parameters_under(rock(stone), scene)).replace(**values)
+    parts = {"hammer": name, "bit": head, "rock": stone, **values}
+    return "&".join(f"{key}={value}" for key, value in parts.items()), scene
+
+
+def test_numbers_are_those_of_settled(built, tmp_path):
+    """To the digits shown, with their errors."""
+    settings = [random_settings(seed) for seed in range(SETTINGS)]
+
+    async def use(one):
+        shown = []
+        for link, _ in settings:
+            await one.ask(f"location.hash = '{link}'; new Promise(done => setTimeout(done, 20))")
+            await one.until(WITH_ERRORS)
+            rate = await one.ask(
+                "['rate', 'numerical'].map(id => document.getElementById(id).textContent).join('|')"
+            )
+            shown.append(
+                (
+                    rate,
+                    dict(await one.ask(ROW)),
+                    await one.ask("document.getElementById('motion').textContent"),
+                )
+            )
+        return shown
+
+    for (link, scene), (rate, row, motion) in zip(
+        settings, opened(built, tmp_path, use), strict=True
+    ):
+        found = settled(scene, error_estimate=True)
+        summary = found.summary()
+        for name, text in row.items():
+            if name in NUMBERS:
+                key, factor, unit = NUMBERS[name]
+                assert text == f"{mean_text(summary, key, factor)} {unit}", (link, name)
+        expected = driller_text(summary, "rate_of_penetration")
+        value, _, error = rate.partition(" m/h|")
+        if "undecided" not in expected and error:
+            assert f"{value} {error.removesuffix(' m/h by the computation')}" == expected, link
+        assert ("alike" in motion) == (found.kind == "periodic" and found.order == 1), link
+
+
+def test_a_link_holds_the_scene_and_is_written_as_toml(built, tmp_path):
+    """The file and the program that the page writes give the scene of the package."""
+    link, scene = random_settings(SETTINGS)
+
+    async def use(one):
+        return await one.ask("['toml', 'python', 'link'].map(form => explorer.state.scene[form]())")
+
+    toml, python, again = opened(built, tmp_path, use, f"#{link}")
+    (tmp_path / "scene.toml").write_text(toml, encoding="utf-8")
+    assert Scene.from_toml(tmp_path / "scene.toml") == scene
+    assert toml in python
+    assert again.startswith("version=")
+    assert again.endswith(link)
+
+
+def test_bad_values_answer_in_place_in_the_words_of_the_package(built, tmp_path):
+    async def use(one):
+        said = []
+        for text in ("1e12", "ab", "11"):
+            await one.ask(
+                "(() => {const field = document.querySelector('#sliders input[type=text]');"
+                f"field.value = '{text}'; field.dispatchEvent(new Event('change'));}})()"
+            )
+            said.append(await one.ask("document.querySelector('#sliders .refusal').textContent"))
+        await one.ask("explorer.change({'rotation.string_stiffness': 5})")
+        await one.until(
+            "explorer.state.found?.refusal && explorer.state.shown === explorer.state.asked"
+        )
+        said.append(await one.ask("document.getElementById('refusal').textContent"))
+        await one.ask("explorer.change({'rotation.string_stiffness': 0})")
+        await one.until(f"{SHOWN} && !explorer.state.found.refusal")
+        return said
+
+    large, word, fine, refused = opened(built, tmp_path, use)
+    assert large == "feed.force = 1000000000000000.0 N: must be a number from -1e9 to 1e9 N"
+    assert word == 'feed.force = "ab": must be a number from -1e9 to 1e9 N'
+    assert fine == ""
+    assert refused.startswith("rotation.string_stiffness = 5.0 N m/rad needs rotation.inertia")
+
+
+def test_keys_alone_choose_move_and_play(built, tmp_path):
+    async def use(one):
+        await one.ask("document.querySelector('#hammers input:checked').focus()")
+        await one.press("ArrowRight")
+        await one.until(f"{SHOWN} && explorer.state.scene.hammer !== 'dth5'")
+        name = await one.ask("document.activeElement.value")
+        await one.ask("document.getElementById('in-feed-force').focus()")
+        before = await one.ask("explorer.state.scene.get('feed.force')")
+        await one.press("ArrowRight")
+        after = await one.ask("explorer.state.scene.get('feed.force')")
+        await one.until(f"{SHOWN} && explorer.state.blow")
+        await one.ask("document.getElementById('play').focus()")
+        await one.press("Enter", "\r")
+        first = await one.ask("document.getElementById('clock').textContent")
+        await one.wait(300)
+        return (
+            name,
+            before,
+            after,
+            first,
+            await one.ask("document.getElementById('clock').textContent"),
+        )
+
+    name, before, after, first, then = opened(built, tmp_path, use)
+    assert name == "dth5 chambers"
+    assert after > before
+    assert then != first
+
+
+def test_many_random_settings_leave_the_worker_alive(built, tmp_path):
+    """Moves that come faster than answers; the last one has its own."""
+    moves = MOVES.replace("COUNT", str(SURVIVED)).replace("WAIT", "60")
+
+    async def use(one):
+        assert await one.ask(moves)
+        await one.until(f"{WITH_ERRORS} && explorer.state.found.rate")
+        return await one.ask("explorer.state.found.rate")
+
+    assert opened(built, tmp_path, use) == pytest.approx(16.350e-3, abs=1e-6)
