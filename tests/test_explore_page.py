@@ -206,6 +206,7 @@ def test_keys_alone_choose_move_and_play(built, tmp_path):
         await one.press("ArrowRight")
         after = await one.ask("explorer.state.scene.get('feed.force')")
         await one.until(f"{SHOWN} && explorer.state.blow")
+        await one.until("!explorer.player.playing")  # it plays once by itself
         await one.ask("document.getElementById('play').focus()")
         await one.press("Enter", "\r")
         first = await one.ask("document.getElementById('clock').textContent")

@@ -37,7 +37,7 @@ export class Drawing {
     this.font = parseFloat(getComputedStyle(document.documentElement).fontSize) * 0.78;
     this.ink = Object.fromEntries(["ink", "soft", "stone", "stone-dark", "steel", "paper", "accent", "contact", "line"].map(name => [name, colour(name)]));
     const room = this.stroke + this.lengths[0] + this.lengths[1];
-    this.floor = 0.84 * this.height; // where the hole's bottom is at first
+    this.floor = this.height - Math.max(0.16 * this.height, 6 * this.font); // where the hole's bottom is at first
     this.k = (this.floor - 2.6 * this.font) / room; // pixels in a metre
     const widest = Math.max(this.hole, ...this.bars.flat().map(one => 2 * Math.sqrt(one[1] / Math.PI)));
     this.r = Math.min(1.7 * this.k, 0.6 * this.width / widest);

@@ -43,7 +43,7 @@ export class Figures {
     this.imperial = imperial;
     for (const plot of [this.waves, this.forces, this.path, this.energy]) plot.ink = undefined;
     this.drawForces(blow, pinned, [1e3 * from, 1e3 * to]);
-    this.drawPath(blow, pinned);
+    this.drawPath(blow, pinned, from, to);
     this.drawWaves(blow, [1e3 * from, 1e3 * to]);
     this.drawEnergy(blow, [1e3 * from, 1e3 * to]);
   }
@@ -60,15 +60,15 @@ export class Figures {
     }
   }
 
-  drawPath(blow, pinned) {
+  drawPath(blow, pinned, from, to) {
     const [unit, factor] = unitOf("force", this.imperial), [short, length] = unitOf("length", this.imperial);
-    const shown = [...(pinned ? [pinned] : []), blow];
-    const all = shown.map(one => one.depth).map(d => [Math.min(...d), Math.max(...d)]);
+    const shown = [...(pinned ? [pinned] : []), blow], inside = one => (_, k) => one.time[k] >= from && one.time[k] <= to;
+    const all = shown.map(one => one.depth.filter(inside(one))).map(d => [Math.min(...d), Math.max(...d)]);
     const low = length * Math.min(...all.map(one => one[0])), high = length * Math.max(...all.map(one => one[1]));
     const room = 0.05 * (high - low || 1), most = Math.max(...shown.map(one => one.greatest.bit_force)) || 1;
     this.path.begin([low - room, high + room], [0, 1.08 * factor * most], `depth of the bit's end, ${short}`, `force on the rock, ${unit}`);
     for (const one of shown) {
-      const points = Array.from(one.depth, (d, k) => [length * d, factor * one.columns.bit_force[k]]);
+      const points = Array.from(one.depth, (d, k) => [length * d, factor * one.columns.bit_force[k]]).filter(inside(one));
       this.path.line(points, one === blow ? "rock" : "grey", one === blow ? 1.7 : 1.2, one === blow ? [] : [4, 3]);
     }
   }

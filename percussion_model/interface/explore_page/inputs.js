@@ -10,7 +10,7 @@ function escaped(text) {
 }
 
 // Titles of rocks that fit a card.
-function shorter(title) {
+export function shorter(title) {
   return title.replace("Granite of a continuum model", "Model granite").replace(", by its strength", "").replace(" of the reference scene", "");
 }
 

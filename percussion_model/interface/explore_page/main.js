@@ -1,7 +1,7 @@
 // The page: from a slider to what is drawn.
 import { Drawing } from "./drawing.js";
 import { Figures, prepared } from "./figures.js";
-import { Inputs } from "./inputs.js";
+import { Inputs, shorter } from "./inputs.js";
 import { unitOf } from "./numbers.js";
 import { Player } from "./player.js";
 import { showResult, numberTexts } from "./result.js";
@@ -113,7 +113,7 @@ function take(answer) {
   } else if (answer.what === "errors") {
     Object.assign(state.found, { same: answer.same, errors: addVolume(answer.errors) });
   } else if (answer.what === "interval") {
-    state.found.interval = { rock: tables.rocks[state.scene.rock].title, ends: answer.ends };
+    state.found.interval = { rock: shorter(tables.rocks[state.scene.rock].title), ends: answer.ends };
   } else if (answer.what === "picture") {
     state.blow = answer.picture && prepared(answer.picture, state.scene);
     return drawBlow(true);
@@ -135,7 +135,10 @@ function drawBlow(keep) {
   if (!state.blow) return;
   drawing.take(state.blow, state.scene, state.imperial, range());
   figures.draw(state.blow, state.pinned?.blow, range(), state.imperial);
-  player.take(range(), keep);
+  const { time, columns, greatest } = state.blow, first = !state.drawn;
+  player.take(range(), keep && !first, time[columns.bit_force.indexOf(greatest.bit_force)]);
+  state.drawn = true;
+  if (first && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.playOnce();
   describe();
 }
 
@@ -258,5 +261,5 @@ inputs = new Inputs(() => state.scene, change);
 part("about").textContent = fill(WORDS.about, { version: tables.version });
 listen();
 start(location.hash);
-globalThis.explorer = { state, tables, change: values => change(state.scene.with(values)), show: change, Scene };
+globalThis.explorer = { state, tables, player, change: values => change(state.scene.with(values)), show: change, Scene };
 startWorker().catch(error => fail(String(error?.message ?? error)));

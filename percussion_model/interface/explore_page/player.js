@@ -13,6 +13,7 @@ export class Player {
     part("speed").addEventListener("change", event => { this.slow = Number(event.target.value); });
     part("play").addEventListener("click", () => this.play(!this.playing));
     part("scrub").addEventListener("input", event => {
+      this.once = false;
       this.play(false);
       this.go(this.range[0] + Number(event.target.value) / 1000 * (this.range[1] - this.range[0]));
     });
@@ -24,10 +25,12 @@ export class Player {
     part("speed").value = String(slow);
   }
 
-  take(range, keep) {
+  // Take another range of time; rest is where to stand unless the time before is kept.
+  take(range, keep, rest) {
     const share = (this.t - this.range[0]) / (this.range[1] - this.range[0]);
     this.range = range;
-    this.go(keep && share >= 0 && share <= 1 ? range[0] + share * (range[1] - range[0]) : Math.max(range[0], 0));
+    this.go(keep && share >= 0 && share <= 1 ? range[0] + share * (range[1] - range[0]) : rest);
+    this.rest = rest;
   }
 
   go(t) {
@@ -39,6 +42,13 @@ export class Player {
   }
 
   text() { return `${short(1e3 * this.t, 3)} ms`; }
+
+  // Play from the start, once.
+  playOnce() {
+    this.go(this.range[0]);
+    this.once = true;
+    this.play(true);
+  }
 
   play(wanted) {
     if (wanted === this.playing) return;
@@ -52,7 +62,10 @@ export class Player {
     if (!this.playing) return;
     const passed = this.last === undefined ? 0 : Math.min(now - this.last, 100) / 1000 / this.slow;
     this.last = now;
-    this.go(this.t + passed >= this.range[1] ? this.range[0] : this.t + passed);
+    const ends = this.t + passed >= this.range[1];
+    if (ends && this.once) this.play(false);
+    this.go(ends ? (this.once ? this.rest : this.range[0]) : this.t + passed);
+    if (ends) this.once = false;
     requestAnimationFrame(this.step);
   }
 }

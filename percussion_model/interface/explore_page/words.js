@@ -14,7 +14,7 @@ export const WORDS = {
   numerical: "± {error} by the computation",
   noError: "error of the computation: being estimated …",
   errorUnknown: "error of the computation not known",
-  rockError: "{low} to {high} by what is known of {rock} and bit; drills differ further, up to a factor 2 without a calibration on site.",
+  rockError: "{low} to {high} by what is known of the rock ({rock}) and the bit. Drills differ further: up to a factor 2 without a calibration on site.",
   rockMissing: "What the rock leaves open is told for a bit that breaks rock: choose one.",
   rockWaiting: "What the rock leaves open is being sampled …",
   rockOwn: "These rock numbers have no name: nothing is known of their error.",
