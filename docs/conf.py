@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 
 from sphinx.application import Sphinx
+
+from percussion_model.interface.explore_page.build import page_file
 
 sys.path.insert(0, str(Path(__file__).parent / "site"))
 
@@ -39,6 +42,10 @@ html_theme = "furo"
 html_title = "Percussion model"
 html_math_renderer = "mathml"
 html_static_path = ["site"]
+html_extra_path = []
+with contextlib.suppress(FileNotFoundError):  # the engine for browsers may not have been made
+    html_extra_path.append(str(page_file()))
+    tags.add("page")  # type: ignore[name-defined]  # noqa: F821
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

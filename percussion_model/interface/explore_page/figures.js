@@ -49,7 +49,7 @@ export class Figures {
   }
 
   drawForces(blow, pinned, x) {
-    const [unit, factor] = unitOf("force", this.imperial), shown = [...(pinned ? [pinned] : []), blow];
+    const [unit, factor] = unitOf("load", this.imperial), shown = [...(pinned ? [pinned] : []), blow];
     const most = Math.max(...shown.map(one => one.greatest.bit_force), ...shown.map(one => one.greatest.contact_force)) || 1;
     this.forces.begin(x, [0, 1.08 * factor * most], "time, ms", `force, ${unit}`);
     for (const one of shown) {
@@ -61,7 +61,7 @@ export class Figures {
   }
 
   drawPath(blow, pinned, from, to) {
-    const [unit, factor] = unitOf("force", this.imperial), [short, length] = unitOf("length", this.imperial);
+    const [unit, factor] = unitOf("load", this.imperial), [short, length] = unitOf("length", this.imperial);
     const shown = [...(pinned ? [pinned] : []), blow], inside = one => (_, k) => one.time[k] >= from && one.time[k] <= to;
     const all = shown.map(one => one.depth.filter(inside(one))).map(d => [Math.min(...d), Math.max(...d)]);
     const low = length * Math.min(...all.map(one => one[0])), high = length * Math.max(...all.map(one => one[1]));
@@ -133,7 +133,7 @@ export class Figures {
     const blow = this.blow;
     if (!blow) return;
     const depth = unitOf("length", this.imperial)[1] * at(blow.time, blow.depth, t);
-    this.path.frame(depth, unitOf("force", this.imperial)[1] * at(blow.time, blow.columns.bit_force, t));
+    this.path.frame(depth, unitOf("load", this.imperial)[1] * at(blow.time, blow.columns.bit_force, t));
   }
 
   // Rate over one setting, with a dot where the hammer is.

@@ -10,6 +10,8 @@ import { SLIDERS, WORDS, fill } from "./words.js";
 
 const part = id => document.getElementById(id);
 const START = { hammer: "dth5", bit: "dth-140", rock: "kuru-granite" };
+// A slower advance is rounding [m/s].
+const LEAST_RATE = 1e-12;
 // Points of a curve, time that a wish may take [ms], and how long the address waits [ms].
 const POINTS = 13, MOST_TIME = 4000, ADDRESS_WAITS = 400;
 const CURVES = [["feed.force", "overFeed", "force", "feed"], ["rotation.speed", "overSpeed", "turns", "rotation"]];
@@ -106,7 +108,8 @@ function take(answer) {
     state.shown = answer.id;
   } else if (answer.what === "rate") {
     const waits = intervalOf(state.scene);
-    state.found = { ...answer.found, interval: waits ? WORDS.rockWaiting : state.scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing };
+    const rate = Math.abs(answer.found.rate) < LEAST_RATE ? 0 : answer.found.rate, undamped = !state.scene.get("effects.loss") || state.scene.get("loss.time") === 0;
+    state.found = { ...answer.found, rate, undamped, interval: waits ? WORDS.rockWaiting : state.scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing };
     addVolume(state.found.means);
     Object.assign(state, { shown: answer.id, took: performance.now() - state.began });
     drawCurves();
@@ -217,7 +220,7 @@ function pin() {
   part("pin").setAttribute("aria-pressed", String(Boolean(state.pinned)));
   part("pin").textContent = state.pinned ? WORDS.unpin : WORDS.pin;
   part("pinned").hidden = !state.pinned;
-  part("pinned").textContent = state.pinned ? fill(WORDS.pinned, { name: [state.scene.base.title, tables.bits[state.scene.bitName]?.short, tables.rocks[state.scene.rock]?.title].filter(Boolean).join("; ") }) : "";
+  part("pinned").textContent = state.pinned ? fill(WORDS.pinned, { name: [state.scene.base.title, tables.bits[state.scene.bitName]?.short, tables.rocks[state.scene.rock]?.title, ...Object.entries(state.scene.values).map(([key, value]) => `${key} = ${value}`)].filter(Boolean).join("; ") }) : "";
   redraw();
 }
 

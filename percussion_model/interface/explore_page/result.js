@@ -9,12 +9,15 @@ export function motionWords(found) {
   const { kind, order, counted } = found;
   const said = kind === "periodic" ? (order === 1 ? WORDS.kinds.once : fill(WORDS.kinds.cycle, { n: order }))
     : fill(WORDS.kinds[kind], { n: counted });
-  return said + (found.same === true ? WORDS.sameMotion : found.same === false ? WORDS.otherMotion : "");
+  const more = (found.rate === 0 ? WORDS.nothing : "") + (found.undamped ? WORDS.undamped : "");
+  return said + more + (found.same === true ? WORDS.sameMotion : found.same === false ? WORDS.otherMotion : "");
 }
 
 export function rateText(found, imperial, kind = "rate") {
   const [unit, factor] = unitOf(kind, imperial), { rate, errors } = found;
   if (!Number.isFinite(rate)) return ["–", ""];
+  if (rate === 0) return [`0 ${unit}`, ""];
+  if (found.undamped) return [WORDS.undecided, fill(WORDS.atThis, { value: `${inDigits(factor * rate)} ${unit}` })];
   const [value, error] = ratePair(rate, errors?.rate_of_penetration, factor);
   if (errors && isUndecided(rate, errors.rate_of_penetration)) return [WORDS.undecided, `${value} ± ${error} ${unit}`];
   return [`${value} ${unit}`, error && `${error} ${unit}`];
@@ -24,10 +27,10 @@ export function rateText(found, imperial, kind = "rate") {
 export function numberTexts(found, imperial) {
   const shown = [];
   const [slow] = rateText(found, imperial, "slow"), [, behind] = rateText(found, imperial, "slow");
-  if (Number.isFinite(found.rate)) shown.push(["Rate", behind && !slow.startsWith(WORDS.undecided) ? `${slow.replace(/ \S+$/, "")} ± ${behind}` : slow]);
+  if (found.rate && !found.undamped) shown.push(["Rate", behind && !slow.startsWith(WORDS.undecided) ? `${slow.replace(/ \S+$/, "")} ± ${behind}` : slow]);
   for (const [key, name, kind] of NUMBERS) {
     const value = found.means?.[key];
-    if (!Number.isFinite(value)) continue;
+    if (!Number.isFinite(value) || (key === "specific_energy" && (found.undamped || found.rate === 0))) continue;
     const [unit, factor] = unitOf(kind, imperial);
     shown.push([name, `${meanText(value, found.errors?.[key], factor)} ${unit}`]);
   }
@@ -46,7 +49,7 @@ export function showResult(found, pinned, imperial) {
   }
   const [rate, error] = rateText(found, imperial);
   part("rate").textContent = rate;
-  part("numerical").textContent = !Number.isFinite(found.rate) ? "" : found.errors ? (error ? fill(WORDS.numerical, { error }) : found.errors.rate_of_penetration === undefined ? WORDS.errorUnknown : "") : WORDS.noError;
+  part("numerical").textContent = !found.rate ? "" : found.undamped ? error : found.errors ? (error ? fill(WORDS.numerical, { error }) : found.errors.rate_of_penetration === undefined ? WORDS.errorUnknown : "") : WORDS.noError;
   part("motion").textContent = motionWords(found);
   part("rock-error").textContent = rockWords(found, imperial);
   const others = new Map(pinned ? numberTexts(pinned, imperial) : []);
@@ -55,7 +58,7 @@ export function showResult(found, pinned, imperial) {
 }
 
 function rockWords(found, imperial) {
-  if (!Number.isFinite(found.rate)) return "";
+  if (!found.rate || found.undamped) return "";
   if (typeof found.interval === "string") return found.interval;
   if (!found.interval) return "";
   const [unit, factor] = unitOf("rate", imperial), [low, high] = found.interval.ends.map(end => inDigits(factor * found.rate * end, 2));

@@ -65,7 +65,9 @@ async function answer(wish) {
     tellRate(tell, found);
     await pause(id);
     tell("picture", { picture: await picture(motion, wish, keep) });
-    if (found.kind !== "stalled" && found.rate !== 0) tell("errors", await withErrors(found, motion, wish.known, start, keep));
+    // of waves in few steps nothing is known here
+    const isKnown = motion.solver === "modal" && found.kind !== "stalled" && found.rate !== 0;
+    tell("errors", isKnown ? await withErrors(found, motion, wish.known, start, keep) : { errors: {} });
     for (const { key, places } of wish.curves) {
       for (const x of places) tell("point", { curve: key, x, rate: await rateAt(() => start({ [key]: x }), keep) });
     }
