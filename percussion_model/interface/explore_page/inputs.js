@@ -91,12 +91,14 @@ class Entry {
     const shown = (!this.drive || this.drive === drive) && (!this.needs || scene.get(this.needs)) && (!this.on || scene.get("feed.on") === this.on);
     this.box.hidden = !shown;
     this.box.style.display = shown ? "" : "none";
+    const name = this.onCasing && scene.get("feed.on") === "casing" ? this.onCasing : this.name;
+    this.box.querySelector("label").textContent = name;
     [this.short, this.factor] = unitOf(this.unit, imperial);
     const value = scene.get(this.key), low = Math.min(this.low, value), high = Math.max(this.high, value);
     Object.assign(this.range, { min: this.factor * low, max: this.factor * high, step: (this.factor * (high - low)) / STEPS });
     if (document.activeElement !== this.range) this.range.value = this.factor * value;
     this.field.value = short(this.factor * value, 4);
-    this.field.setAttribute("aria-label", `${this.name}, ${this.short}`);
+    this.field.setAttribute("aria-label", `${name}, ${this.short}`);
     this.range.setAttribute("aria-valuetext", `${this.field.value} ${this.short}`);
     this.range.title = scene.tables.rows.get(this.key).description;
     this.box.querySelector(".unit").textContent = this.short;

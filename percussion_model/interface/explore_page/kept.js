@@ -1,6 +1,6 @@
 // Tables that equal scenes share, kept from wish to wish: most of the time to create a motion.
 
-const MOST = 12, WORD = 8, ROOM = 64;
+const MOST = 8, WORD = 8, ROOM = 64;
 
 // Let an engine keep the motions whose tables others use.
 export function keepTables(engine) {

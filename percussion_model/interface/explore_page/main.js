@@ -28,10 +28,20 @@ async function startWorker() {
   const source = part("worker").textContent;
   worker = new Worker(URL.createObjectURL(new Blob([source], { type: "text/javascript" })));
   worker.onmessage = ({ data }) => take(data);
-  worker.onerror = event => { event.preventDefault(); fail(event.message); };
+  worker.onerror = event => { event.preventDefault(); crash(event.message); };
   const unpacked = new Blob([bytes(part("engine").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
   const wasm = await new Response(unpacked).arrayBuffer();
   worker.postMessage({ wasm, table }, [wasm]);
+}
+
+// A worker that has died is followed by another, which waits for the next scene.
+function crash(why) {
+  worker.terminate();
+  state.ready = false;
+  state.found = { refusal: fill(WORDS.crashed, { why }) };
+  state.shown = state.asked;
+  showResult(state.found, state.pinned?.found, state.imperial);
+  startWorker();
 }
 
 function fail(why) {
@@ -78,10 +88,14 @@ function ask() {
   for (const [key] of CURVES) state.curves[key] = emptyCurve(scene, key);
   state.asked += 1;
   part("result").classList.add("waiting");
-  worker.postMessage({ id: state.asked, ...wishOf(scene) });
-  state.began = performance.now();
+  if (state.ready) send();
   clearTimeout(waiting);
   waiting = setTimeout(() => history.replaceState(null, "", `#${scene.link()}`), ADDRESS_WAITS);
+}
+
+function send() {
+  state.began = performance.now();
+  worker.postMessage({ id: state.asked, ...wishOf(state.scene) });
 }
 
 function emptyCurve(scene, key) {
@@ -100,7 +114,11 @@ function addVolume(numbers) {
 
 // Take an answer of the worker.
 function take(answer) {
-  if (answer.ready) return ask();
+  if (answer.ready) {
+    state.ready = true;
+    return state.asked === state.shown ? undefined : send();
+  }
+  if (answer.crashed) return crash(answer.crashed);
   if (answer.broken) return fail(answer.broken);
   if (answer.id !== state.asked) return undefined;
   if (answer.what === "refusal") {
@@ -183,8 +201,13 @@ function say(text) {
 }
 
 function copy(text) {
-  const done = () => say(WORDS.copied), refused = () => say(WORDS.notCopied);
-  if (navigator.clipboard) navigator.clipboard.writeText(text).then(done, refused); else refused();
+  const done = () => say(WORDS.copied);
+  const byHand = () => {
+    Object.assign(part("by-hand"), { value: text, hidden: false });
+    part("by-hand").select();
+    say(WORDS.notCopied);
+  };
+  if (navigator.clipboard) navigator.clipboard.writeText(text).then(done, byHand); else byHand();
 }
 
 function save(name, blob) {
@@ -249,7 +272,7 @@ function start(hash) {
   state.scene = scene;
   inputs.show();
   if (said) say(said);
-  if (state.asked) ask();
+  ask();
 }
 
 part("more").open = matchMedia("(min-width: 700px) and (max-width: 1149px)").matches;
@@ -264,5 +287,5 @@ inputs = new Inputs(() => state.scene, change);
 part("about").textContent = fill(WORDS.about, { version: tables.version });
 listen();
 start(location.hash);
-globalThis.explorer = { state, tables, player, change: values => change(state.scene.with(values)), show: change, Scene };
+globalThis.explorer = { state, tables, player, take, change: values => change(state.scene.with(values)), show: change, Scene };
 startWorker().catch(error => fail(String(error?.message ?? error)));

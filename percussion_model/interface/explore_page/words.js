@@ -23,7 +23,7 @@ export const WORDS = {
   rockOwn: "These rock numbers have no name: nothing is known of their error.",
   pinned: "Small grey numbers: pinned, {name}.",
   copied: "Copied.",
-  notCopied: "Not copied: the browser does not allow it.",
+  notCopied: "The browser lets nothing be copied: copy the text that is marked.",
   play: "Play", pause: "Pause",
   light: "Light", dark: "Dark", metric: "Metric units", imperial: "Imperial units",
   pin: "Pin to compare", unpin: "Remove pinned",
@@ -32,6 +32,7 @@ export const WORDS = {
   tooLong: "No stationary response within {seconds} s of computing, which is the limit here: percussion settled of this scene may take longer.",
   drawn: "Piston, bit and rock in slow motion. Greatest stress {mega} MPa, greatest force on the rock {force} kN.",
   plotted: "{what}. The blow lasts {period} ms; greatest force on the rock {force} kN, greatest stress {mega} MPa.",
+  crashed: "The engine has stopped at this scene ({why}). It was started anew: choose another.",
   engine: "This browser cannot run the engine: {why}",
   oldLink: "This link was made by version {theirs}; this page is version {ours}. Numbers may differ.",
   badLink: "In the link, {why}",
@@ -43,7 +44,7 @@ export const WORDS = {
 
 // Sliders: key of the table, name, kind of unit, where it reaches [SI], and when it is shown.
 export const SLIDERS = [
-  { key: "feed.force", name: "Feed", unit: "force", low: 0, high: 20e3 },
+  { key: "feed.force", name: "Feed", onCasing: "Feed on the casing", unit: "force", low: 0, high: 20e3 },
   { key: "drive.force", name: "Drive force on the piston", unit: "force", low: 500, high: 20e3, drive: "pressure" },
   { key: "pneumatic.supply_pressure", name: "Air pressure", unit: "pressure", low: 4e5, high: 35e5, drive: "pneumatic" },
   { key: "drive.reversal_distance", name: "Stroke: where the drive turns", unit: "length", low: 0.005, high: 0.1, drive: "pressure" },

@@ -1,5 +1,5 @@
 // The worker: answers the newest wish of the page, the rate first, then all that takes longer.
-import { Engine } from "../../engine/engine.js";
+import { Engine, EngineError } from "../../engine/engine.js";
 import { afterSettling, numbersOver, rateOfBlows, settle } from "./settle.js";
 import { withErrors } from "./grid_error.js";
 import { keepTables } from "./kept.js";
@@ -37,7 +37,8 @@ onmessage = async ({ data }) => {
   try {
     await answer(data);
   } catch (error) {
-    if (!(error instanceof Overtaken)) postMessage({ id: data.id, what: "refusal", text: String(error?.message ?? error) });
+    if (error instanceof WebAssembly.RuntimeError) postMessage({ crashed: String(error.message) });
+    else if (!(error instanceof Overtaken)) postMessage({ id: data.id, what: "refusal", text: String(error?.message ?? error) });
   }
 };
 
@@ -89,7 +90,7 @@ async function rateAt(begin, keep) {
     one = begin();
     return (await settle(one, keep)).rate;
   } catch (error) {
-    if (error instanceof Overtaken) throw error;
+    if (!(error instanceof EngineError)) throw error;
     return NaN; // that point has no rate
   } finally {
     one?.free();
@@ -104,7 +105,8 @@ async function interval(wish, start, tell, keep) {
     try {
       one.runUntil(DURATION);
       return rateOfBlows(one.blows.filter(blow => blow.time >= SETTLE && blow.time + blow.period <= DURATION))[0];
-    } catch {
+    } catch (error) {
+      if (!(error instanceof EngineError)) throw error;
       return NaN; // that sample has no rate
     } finally {
       one.free();
