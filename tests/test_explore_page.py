@@ -201,7 +201,7 @@ def test_keys_alone_choose_move_and_play(built, tmp_path):
     async def use(one):
         await one.ask("document.querySelector('#hammers input:checked').focus()")
         await one.press("ArrowRight")
-        await one.until(f"{SHOWN} && explorer.state.scene.hammer !== 'dth5'")
+        await one.until(f"{SHOWN} && explorer.state.scene.hammer !== 'dth4'")
         name = await one.ask("document.activeElement.value")
         await one.ask("document.getElementById('in-feed-force').focus()")
         before = await one.ask("explorer.state.scene.get('feed.force')")
@@ -222,7 +222,7 @@ def test_keys_alone_choose_move_and_play(built, tmp_path):
         )
 
     name, before, after, first, then = opened(built, tmp_path, use)
-    assert name == "dth5 chambers"
+    assert name == "dth4 chambers"
     assert after > before
     assert then != first
 

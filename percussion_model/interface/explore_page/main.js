@@ -9,7 +9,7 @@ import { Scene } from "./scene.js";
 import { SLIDERS, WORDS, fill } from "./words.js";
 
 const part = id => document.getElementById(id);
-const START = { hammer: "dth5", bit: "dth-140", rock: "kuru-granite" };
+const START = { hammer: "dth4", bit: "dth-115", rock: "kuru-granite" };
 // A slower advance is rounding [m/s].
 const LEAST_RATE = 1e-12;
 // Points of a curve, time that a wish may take [ms], and how long the address waits [ms].
