@@ -183,6 +183,12 @@ def test_without_bokeh_the_extra_is_named(monkeypatch):
     assert 'is missing: pip install "percussion_model[report]"' in found.stderr
 
 
+def test_the_page_without_a_server_has_scenes_of_its_own():
+    found = CliRunner().invoke(app, ["explore", "reference", "--page", "--no-browser"])
+    assert found.exit_code == 2
+    assert "--page: has hammers, bits and rocks of its own" in found.output
+
+
 def test_a_bad_scene_is_refused_before_a_page_is_served(tmp_path):
     file = tmp_path / "drop.toml"
     file.write_text('[piston]\nmodel = "absent"\n[effects]\ndrive = "none"\n')
