@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 from pathlib import Path
 
 from sphinx.application import Sphinx
 
-from percussion_model.interface.explore_page.build import page_file
+from percussion_model.interface.explore_page.build import is_at_hand, page_file
 
 sys.path.insert(0, str(Path(__file__).parent / "site"))
 
@@ -43,7 +42,7 @@ html_title = "Percussion model"
 html_math_renderer = "mathml"
 html_static_path = ["site"]
 html_extra_path = []
-with contextlib.suppress(FileNotFoundError):  # the engine for browsers may not have been made
+if is_at_hand():  # making the engine for browsers takes minutes
     html_extra_path.append(str(page_file()))
     tags.add("page")  # type: ignore[name-defined]  # noqa: F821
 html_css_files = ["site.css"]

@@ -186,7 +186,7 @@ export class Engine {
 
 // --- values in words, as Python writes them
 
-function allowed(row, value) {
+export function allowed(row, value) {
   if (value === null) return !row.required; // as the default
   if (row.kind === "flag") return typeof value === "boolean";
   if (row.kind === "choice") return row.choices.includes(value);
@@ -195,7 +195,7 @@ function allowed(row, value) {
   return low && (row.upper === null || value < row.upper || (value === row.upper && !row.upperOpen));
 }
 
-function shown(row, value) {
+export function shown(row, value) {
   if (typeof value !== "number") return JSON.stringify(value);
   const unit = ["", "-"].includes(row.unit) ? "" : ` ${row.unit}`;
   const isWhole = row.kind === "whole number" || row.kind === "choice";

@@ -71,16 +71,15 @@ def _open_page(browser: bool, is_own: bool) -> None:
     """Open the page that runs the hammer itself, a file."""
     import webbrowser
 
+    from percussion_model.engine.compiler import NoCompilerError
     from percussion_model.interface.explore_page.build import page_file
 
     if is_own:
         raise common.refusal("--page: has hammers, bits and rocks of its own: give no others")
     try:
         address = page_file().as_uri()
-    except FileNotFoundError as error:
-        raise common.refusal(
-            f"--page: {error}; `python -m percussion_model.engine.wasm` makes it"
-        ) from None
+    except NoCompilerError as error:
+        raise common.refusal(f"--page: {error}") from None
     print(address, flush=True)
     if browser:
         webbrowser.open(address)

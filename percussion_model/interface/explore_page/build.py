@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from percussion_model.analysis.rock_interval import SAMPLES, sample_shares, uncertain_numbers
+from percussion_model.engine import library, wasm
 from percussion_model.interface.plotting.window import TRANSITS_SHOWN
 from percussion_model.scene.bits import bit, bits
 from percussion_model.scene.hammers import AIR, hammer, hammers, with_chambers
@@ -22,8 +23,8 @@ from percussion_model.scene.writing import write_whole
 
 HERE = Path(__file__).parent
 NAME = "explore.html"
-# Files of the engine for browsers.
-ENGINE = ("engine.js", "engine.wasm", "table.json")
+# Where a clone has the engine for browsers.
+FOLDER = HERE.parents[2] / "dist" / "web"
 # Modules of page and worker, each after those that it takes from.
 PAGE = ("words", "numbers", "scene", "pictures", "plot", "figures", "drawing", "inputs", "result",
         "player", "main")  # fmt: skip
@@ -37,9 +38,23 @@ IMPORT = re.compile(r'^import \{(.*?)\} from "[./\w]*?(\w+)\.js";\n', re.M | re.
 MOST_UNCERTAIN = 8
 
 
+def is_at_hand() -> bool:
+    """Whether the engine for browsers is there, made of the present sources."""
+    table = FOLDER / "table.json"
+    return table.is_file() and json.loads(table.read_text("utf-8"))["stamp"] == library.stamp()
+
+
 def engine_folder() -> Path:
-    """Where the engine for browsers is put: `dist/web` of a clone."""
-    return HERE.parents[2] / "dist" / "web"
+    """Folder with the engine for browsers, which is made where it is old.
+
+    Raises
+    ------
+    NoCompilerError
+        If nothing here compiles for browsers.
+    """
+    if not is_at_hand():
+        wasm.write(FOLDER)
+    return FOLDER
 
 
 def page_file() -> Path:
@@ -47,14 +62,12 @@ def page_file() -> Path:
 
     Raises
     ------
-    FileNotFoundError
-        If there is no engine for browsers.
+    NoCompilerError
+        If nothing here compiles for browsers.
     """
-    brought, engine = HERE / NAME, engine_folder()
-    if brought.is_file():
-        return brought
-    if not all((engine / name).is_file() for name in ENGINE):
-        raise FileNotFoundError(f"{engine}: holds no engine for browsers")
+    if (HERE / NAME).is_file():
+        return HERE / NAME
+    engine = engine_folder()
     file = engine / NAME
     write_whole(file, page(engine))
     return file
@@ -66,14 +79,13 @@ def page(engine: Path) -> str:
     Parameters
     ----------
     engine : Path
-        Folder with the files of `ENGINE`.
+        Folder with `engine.wasm` and `table.json`.
     """
-    script, wasm, table = (engine / name for name in ENGINE)
-    packed = gzip.compress(wasm.read_bytes(), 9, mtime=0)
-    own = script.read_text("utf-8")
+    packed = gzip.compress((engine / "engine.wasm").read_bytes(), 9, mtime=0)
+    own = wasm.SCRIPT.read_text("utf-8")
     parts = {
         "STYLE": _source("style.css"),
-        "TABLE": _as_json(_less(json.loads(table.read_text("utf-8")))),
+        "TABLE": _as_json(_less(json.loads((engine / "table.json").read_text("utf-8")))),
         "CATALOGUE": _as_json(catalogue()),
         "ENGINE": base64.b64encode(packed).decode(),
         "WORKER": joined({"engine": own} | {name: _source(f"{name}.js") for name in WORKER}),
