@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,7 @@ from percussion_model.engine import library
 from percussion_model.engine.compiler import NoCompilerError, objects
 from percussion_model.engine.entries import SOLVERS
 from percussion_model.engine.platforms import PLATFORMS
+from percussion_model.interface.explore_page.build import BROUGHT, page_file
 from percussion_model.interface.progress import lines
 from percussion_model.scene.scene import SceneError
 
@@ -45,7 +47,7 @@ def zig(name: str) -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc", "-s", "-target", PLATFORMS[name].zig]
 
 
-def fill(folder: Path, name: str, command: Sequence[str]) -> None:
+def fill(folder: Path, name: str, command: Sequence[str], page: Path | None = None) -> None:
     """Put into a folder what a wheel for a platform holds beside the sources.
 
     Parameters
@@ -54,7 +56,13 @@ def fill(folder: Path, name: str, command: Sequence[str]) -> None:
         Of `PLATFORMS`.
     command : sequence of str
         Of the C compiler that links.
+    page : Path, optional
+        That which runs the hammer in a browser.
     """
+    if page is not None:
+        brought = folder / BROUGHT.relative_to(ROOT)
+        brought.parent.mkdir(parents=True)
+        shutil.copyfile(page, brought)
     (folder / TAG).write_text(TAGS[name], encoding="utf-8")
     for solver in SOLVERS:
         file = folder / library.brought_file(solver, name).relative_to(ROOT)
@@ -67,7 +75,7 @@ def fill(folder: Path, name: str, command: Sequence[str]) -> None:
     packed.with_suffix("").unlink()
 
 
-def make_wheel(name: str, command: Sequence[str], out: Path) -> Path:
+def make_wheel(name: str, command: Sequence[str], out: Path, page: Path | None = None) -> Path:
     """Make the wheel for a platform in a folder.
 
     Raises
@@ -78,7 +86,7 @@ def make_wheel(name: str, command: Sequence[str], out: Path) -> Path:
     with tempfile.TemporaryDirectory(prefix="percussion-wheel-") as work:
         libraries, made = Path(work) / "libraries", Path(work) / "wheel"
         libraries.mkdir()
-        fill(libraries, name, command)
+        fill(libraries, name, command, page)
         build = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation"]
         done = subprocess.run(
             [*build, "-w", str(made), str(ROOT)], text=True, capture_output=True,
@@ -101,8 +109,9 @@ def main(words: Sequence[str] | None = None) -> int:
         names = list(platform_names(given.platforms)) or list(TAGS)
         with lines("compiling") as report:
             objects(MODULES, names, report)
+            page = page_file(report)
         for name in names:
-            print(f"wrote {make_wheel(name, zig(name), given.out)}", flush=True)
+            print(f"wrote {make_wheel(name, zig(name), given.out, page)}", flush=True)
     except (SceneError, NoCompilerError) as error:
         print(f"wheels: {error}", file=sys.stderr)
         return 2

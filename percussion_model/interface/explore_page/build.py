@@ -13,6 +13,7 @@ from typing import Any
 
 from percussion_model.analysis.rock_interval import SAMPLES, sample_shares, uncertain_numbers
 from percussion_model.engine import library, wasm
+from percussion_model.engine.compiler import Report
 from percussion_model.interface.plotting.window import TRANSITS_SHOWN
 from percussion_model.scene.bits import bit, bits
 from percussion_model.scene.hammers import AIR, hammer, hammers, with_chambers
@@ -23,6 +24,7 @@ from percussion_model.scene.writing import write_whole
 
 HERE = Path(__file__).parent
 NAME = "explore.html"
+BROUGHT = HERE / NAME
 # Where a clone has the engine for browsers.
 FOLDER = HERE.parents[2] / "dist" / "web"
 # Modules of page and worker, each after those that it takes from.
@@ -44,7 +46,7 @@ def is_at_hand() -> bool:
     return table.is_file() and json.loads(table.read_text("utf-8"))["stamp"] == library.stamp()
 
 
-def engine_folder() -> Path:
+def engine_folder(report: Report | None = None) -> Path:
     """Folder with the engine for browsers, which is made where it is old.
 
     Raises
@@ -53,11 +55,11 @@ def engine_folder() -> Path:
         If nothing here compiles for browsers.
     """
     if not is_at_hand():
-        wasm.write(FOLDER)
+        wasm.write(FOLDER, report)
     return FOLDER
 
 
-def page_file() -> Path:
+def page_file(report: Report | None = None) -> Path:
     """The page: as a wheel brings it, or else made of what is in a clone.
 
     Raises
@@ -65,9 +67,9 @@ def page_file() -> Path:
     NoCompilerError
         If nothing here compiles for browsers.
     """
-    if (HERE / NAME).is_file():
-        return HERE / NAME
-    engine = engine_folder()
+    if BROUGHT.is_file():
+        return BROUGHT
+    engine = engine_folder(report)
     file = engine / NAME
     write_whole(file, page(engine))
     return file
