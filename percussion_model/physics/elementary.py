@@ -381,7 +381,7 @@ def _pieces(at, m_0, m_1, m_2, m_3):
     return m_0 * int(first) + m_1 * int(second) + m_2 * int(third) + m_3 * int(last)
 
 
-@scalar
+@inlined_scalar
 def _reduce_large(x):
     """Quarter turns in x modulo four, and the rest of it in two, by whole numbers."""
     bits = bits_of(abs(x))
