@@ -44,8 +44,8 @@ FLAGS = ("-std=c11", "-O2", "-D_POSIX_C_SOURCE=200809L", "-fvisibility=hidden", 
 # Takes what is being done, and the share that is done of it.
 Report = Callable[[str, float | None], None]
 # Compiling takes about as long, for the share that is told [s].
-USUAL = {"modal": 110.0, "wave": 52.0, "fem": 42.0, "rigid": 32.0}
-USUAL_ELSE = 30.0
+USUAL = {"modal": 72.0, "wave": 35.0, "fem": 37.0, "rigid": 14.0}
+USUAL_ELSE = 10.0
 # What is under way counts for no more than this share, and is looked at so often [s].
 ALMOST, LOOK = 0.95, 1.0
 
