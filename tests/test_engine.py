@@ -175,6 +175,16 @@ def test_what_a_kernel_holds_tells_when_to_translate_it_anew():
     assert len({content_of(records_at(kind)) for kind in kinds}) == 2
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_what_entries_hold_is_known_so_that_an_edit_compiles_little(solver):
+    from percussion_model.engine.translations import content_of
+    from percussion_model.physics.kernel import _compiler
+
+    _compiler()
+    for name in ENTRIES:
+        content_of(getattr(import_module(module_of(solver)), name))
+
+
 def test_libraries_for_windows_name_what_they_export():
     text = _exports("rigid", [Path("x86_64-windows_base.o"), Path("x86_64-windows_avx2.o")])
     assert text.count("-export:") == 2 * len(ENTRIES)

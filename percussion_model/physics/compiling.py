@@ -209,7 +209,8 @@ def replace(function: Callable, make: Callable) -> None:
     function : callable
         What plain Python calls.
     make : callable
-        What `numba.extending.overload` takes: from the types of the arguments, that other one.
+        What `numba.extending.overload` takes: gives that other one, whatever the types of the
+        arguments.
     """
     setattr(function, MAKERS, (make,))
     overload(function)(make)
