@@ -8,13 +8,13 @@ import pytest
 from percussion_model import Simulation
 from percussion_model.physics.kernel import inlined
 from percussion_model.scene import solver_names
+from percussion_model.scene.group import table_of
 from percussion_model.scene.parameters import (
     COMPONENTS,
     GROUPS,
     Component,
     find_row,
     groups_with,
-    table_of,
 )
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene

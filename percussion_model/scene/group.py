@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, Self
 
 from percussion_model.scene.rows import (
@@ -140,3 +140,12 @@ def _refuse_table(key: str, value: Any, wanted: str) -> str:
 
 def _refuse_missing(row: ParameterRow, key: str) -> str:
     return f"{key} is missing: must be {row.allowed}"
+
+
+def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
+    """Go through the rows of groups; keys of sections have a `*` for their number."""
+    for key, group in groups.items():
+        for name, row in group.rows.items():
+            yield dataclasses.replace(row, key=f"{key}.{name}")
+            if row.kind in LISTED:
+                yield from table_of({f"{key}.{name}.*": LISTED[row.kind]})

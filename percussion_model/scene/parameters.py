@@ -11,7 +11,7 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from typing import Any, Self
@@ -37,7 +37,6 @@ from percussion_model.scene.group import (
     GRAVITY_ON,
     HAS_PISTON,
     HAS_WAVES,
-    LISTED,
     LOSS_ON,
     ROCK_CRUSHED,
     ROCK_POWER,
@@ -48,6 +47,7 @@ from percussion_model.scene.group import (
     SOLVER_WAVE,
     STRING_ON,
     Parameters,
+    table_of,
 )
 from percussion_model.scene.retired import BLOW_MAP, BLOW_MAP_TABLE
 from percussion_model.scene.rows import (
@@ -501,15 +501,6 @@ def _group(
 ) -> type[Parameters]:
     about = {"__module__": __name__, "__doc__": doc, "__annotations__": dict.fromkeys(fields, Any)}
     return type(name, (base,), {**about, **fields})
-
-
-def table_of(groups: Mapping[str, type[Parameters]]) -> Iterator[ParameterRow]:
-    """Go through the rows of groups; keys of sections have a `*` for their number."""
-    for key, group in groups.items():
-        for name, row in group.rows.items():
-            yield dataclasses.replace(row, key=f"{key}.{name}")
-            if row.kind in LISTED:
-                yield from table_of({f"{key}.{name}.*": LISTED[row.kind]})
 
 
 # The groups of a scene, in the order in which they are written.
