@@ -1,1 +1,1 @@
-"""Accuracy against time, hard cases, measurements, the paper's statements."""
+"""Accuracy, hard cases, measurements."""
