@@ -19,12 +19,14 @@ from percussion_model.analysis.stationary import (
     NEXT_CHECK,
     rate_so_far,
 )
+from percussion_model.engine.solver import EngineSolver
 from percussion_model.interface.cli import app
 from percussion_model.interface.terminal import show_settled
 from percussion_model.physics import settling
 from percussion_model.physics.records import BLOW
 from percussion_model.physics.settling import COMPARED
 from percussion_model.simulation.rate import rate_of_blows
+from percussion_model.solvers.base import Solver, make_solver
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 TOLERANCE = 1e-4
@@ -342,6 +344,18 @@ def test_an_error_at_which_a_run_ends_is_not_small_by_chance(kept):
         off.append(abs(rate - rate_of(8.0)) / error)
     assert np.mean(np.array(off) < 1.0) > 0.55
     assert np.mean(np.array(off) < 2.0) > 0.85
+
+
+def test_solvers_that_others_add_settle_as_those_of_the_engine():
+    scene, found = Scene(), []
+    for kind in (Solver, EngineSolver):
+        solver, rows = make_solver(scene), np.zeros(40, BLOW)
+        state, asked = solver.new_state(), settling.request_for(TOLERANCE, len(rows), 0.0)
+        while asked[0].verdict == settling.Verdict.OPEN:
+            assert kind.settle(solver, state, asked, rows) == 0
+        found.append((rows.tobytes(), asked.tobytes()))
+    assert found[0] == found[1]
+    assert asked[0].verdict == settling.Verdict.PERIODIC
 
 
 def test_an_aperiodic_motion_ends_at_the_wanted_standard_error():

@@ -15,7 +15,7 @@ from percussion_model.physics.settling import (
     Verdict,
     blows_wanted,
     judge,
-    patience,
+    stalls_at,
 )
 
 requests = records_at(REQUEST)
@@ -39,7 +39,7 @@ def settler(run: Any, state_time: Any) -> Any:
         while asked.verdict == Verdict.OPEN and asked.time < asked.until:
             n = asked.blows
             asked.wanted = blows_wanted(asked.judged, asked.most)
-            stalled = max(patience(rows, asked.judged), asked.time)
+            stalled = max(stalls_at(rows, asked.judged), asked.time)
             end = min(stalled, asked.until)
             status = run(
                 base, moving, ADVANCE, end, blows + n * BLOW_BYTES, asked.wanted - n, 0, 0, 0

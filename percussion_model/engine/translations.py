@@ -119,12 +119,14 @@ def _of_function(value: FunctionType, inside: tuple[Any, ...]) -> str:
     name = f"{value.__module__}.{value.__qualname__}"
     if value in inside or _is_of_library(name):
         return name
-    for make in value.__dict__.get(compiling.MAKERS, ()):  # kernels have that in its place
+    make = vars(value).get(compiling.MAKER)
+    if make is not None:  # kernels have that in its place
         return content_of(make(*[None] * make.__code__.co_argcount), inside)
     if id(value) not in _known:
         used: list[Any] = [value.__defaults__, value.__kwdefaults__]
         used += (cell.cell_contents for cell in value.__closure__ or ())
-        words = [name, *map(_of_file, value.__dict__.get(compiling.INSTRUCTIONS, ()))]
+        define = vars(value).get(compiling.INSTRUCTIONS)
+        words = [name, "" if define is None else _of_file(define)]
         for code in _codes_of(value.__code__):
             words += (code.co_code.hex(), *code.co_names, *code.co_varnames, *code.co_freevars)
             used += (one for one in code.co_consts if not isinstance(one, CodeType))

@@ -34,7 +34,7 @@ from percussion_model.scene.bits import bit, bit_of, bits
 from percussion_model.scene.hammers import CHAMBERS, hammer, hammers, with_chambers
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.scene.numbers import joint_numbers
-from percussion_model.scene.parameters import GROUPS
+from percussion_model.scene.parameters import GROUPS, parameter_table
 from percussion_model.scene.presets import scene_presets
 from percussion_model.scene.rocks import rock, rocks
 from percussion_model.scene.rocks.breaking import parameters_under
@@ -155,8 +155,6 @@ def _row(row: ParameterRow) -> dict[str, Any]:
 
 def _parameter(field: str) -> dict[str, Any]:
     """A parameter that is a word of an image, in the order of the words."""
-    from percussion_model.scene.parameters import parameter_table
-
     row = next(one for one in parameter_table() if one.key.replace(".", "_") == field)
     group = row.key.partition(".")[0]
     return _row(row) | {

@@ -38,8 +38,8 @@ sys.setrecursionlimit(max(sys.getrecursionlimit(), DEEPEST))
 # compiling.
 Record.__repr__ = functools.cache(Record.__repr__)  # type: ignore[method-assign]
 # Attributes of a plain function with what kernels have in its place: what writes instructions,
-# and what makes a function (one each).
-INSTRUCTIONS, MAKERS = "_instructions", "_makers"
+# or what makes a function.
+INSTRUCTIONS, MAKER = "_instructions", "_maker"
 _log = logging.getLogger("percussion_model")
 # What keeps translations of a function with these options from one process to the next, if any.
 keeper_of: Callable[[Callable, dict[str, Any]], Any] | None = None
@@ -195,7 +195,7 @@ def instruct(function: Callable, define: Callable) -> None:
         What `numba.extending.intrinsic` takes: from the types of the arguments, the signature
         and what writes the instructions.
     """
-    setattr(function, INSTRUCTIONS, (define,))
+    setattr(function, INSTRUCTIONS, define)
     template = make_intrinsic_template(function, define, function.__name__)
     infer(template)
     infer_global(function, types.Function(template))
@@ -212,5 +212,5 @@ def replace(function: Callable, make: Callable) -> None:
         What `numba.extending.overload` takes: gives that other one, whatever the types of the
         arguments.
     """
-    setattr(function, MAKERS, (make,))
+    setattr(function, MAKER, make)
     overload(function)(make)

@@ -86,7 +86,7 @@ class Cycle(NamedTuple):
 
 
 @inlined
-def none():
+def no_cycle():
     """No cycle."""
     return Cycle(0, math.nan, math.nan, math.nan)
 
@@ -216,7 +216,7 @@ def scattering(rows, n, order, tolerance):
         drift = max(drift, largest(one, other, third))
     # what still drifts one way, however slowly, has not arrived
     if not drift <= most <= tolerance:
-        return none()
+        return no_cycle()
     low, high, whole = math.inf, -math.inf, 0.0
     for k in range(count):
         rate = rate_over(rows, n - 1 - k * order, order)
@@ -228,20 +228,20 @@ def scattering(rows, n, order, tolerance):
 def cycle(rows, n, order, tolerance):
     """Make out whether the last of `n` blows are a cycle of `order`; `Cycle`."""
     if n < 3 * order:
-        return none()
+        return no_cycle()
     scale = scale_over(rows, n, order)
     newer = change_over(rows, n - 1, order, order, scale)
     older = change_over(rows, n - 1 - order, order, order, scale)
     if max(newer, older) <= STILL * tolerance:
         return limit(rows, n, order)
     if not newer <= tolerance:
-        return none()
+        return no_cycle()
     ratio = newer / older if older > 0.0 else 1.0
     to_come = newer * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
     if order == 1 and to_come <= tolerance and converges(rows, n, scale, tolerance):
         return limit(rows, n, order)
     if n < repetitions(order) * order:
-        return none()
+        return no_cycle()
     return scattering(rows, n, order, tolerance)
 
 
@@ -268,7 +268,7 @@ def cycle_in(rows, n, tolerance):
             found = cycle(rows, n, order, tolerance)
             if found.order > 0:
                 return found
-    return none()
+    return no_cycle()
 
 
 @kernel
@@ -279,7 +279,7 @@ def blows_wanted(n, most):
 
 
 @kernel
-def patience(rows, n):
+def stalls_at(rows, n):
     """Time at which a run has stalled in which no more blow ends than `n` [s]."""
     if n == 0:
         return STALLED_AFTER

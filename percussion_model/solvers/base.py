@@ -152,8 +152,8 @@ class Solver(ABC):
         """
         one, rows = asked[0], blows.view(float).reshape(len(blows), -1)
         n, judged = int(one.blows), int(one.judged)
-        wanted = settling.blows_wanted(judged, int(one.most))
-        stalled = max(settling.patience(rows, judged), one.time)
+        one.wanted = wanted = settling.blows_wanted(judged, int(one.most))
+        stalled = max(settling.stalls_at(rows, judged), one.time)
         end, events = min(stalled, one.until), np.zeros(1, EVENT)
         status, more, _ = self.advance(state, end, blows[n:wanted], events, False)
         one.blows = n + more

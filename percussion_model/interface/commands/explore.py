@@ -73,11 +73,13 @@ def _open_page(browser: bool, is_own: bool) -> None:
 
     from percussion_model.engine.compiler import NoCompilerError
     from percussion_model.interface.explore_page.build import page_file
+    from percussion_model.interface.progress import lines
 
     if is_own:
         raise common.refusal("--page: has hammers, bits and rocks of its own: give no others")
     try:
-        address = page_file().as_uri()
+        with lines("compiling for browsers") as report:
+            address = page_file(report).as_uri()
     except NoCompilerError as error:
         raise common.refusal(f"--page: {error}") from None
     print(address, flush=True)

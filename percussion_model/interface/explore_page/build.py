@@ -14,6 +14,7 @@ from typing import Any
 from percussion_model.analysis.rock_interval import SAMPLES, sample_shares, uncertain_numbers
 from percussion_model.engine import library, wasm
 from percussion_model.engine.compiler import Report
+from percussion_model.engine.web_table import PRESSURES
 from percussion_model.interface.plotting.window import TRANSITS_SHOWN
 from percussion_model.scene.bits import bit, bits
 from percussion_model.scene.hammers import AIR, hammer, hammers, with_chambers
@@ -31,8 +32,6 @@ FOLDER = HERE.parents[2] / "dist" / "web"
 PAGE = ("words", "numbers", "scene", "pictures", "plot", "figures", "drawing", "inputs", "result",
         "player", "main")  # fmt: skip
 WORKER = ("settle", "grid_error", "kept", "picture", "worker")
-# Pressure of air of the table's hammers with chambers [Pa].
-PRESSURE = 24e5
 # Bits that go with a hammer, by the diameter of its hole; the reference bores 3 1/4 inches.
 LEAST_HOLE, MOST_HOLE, REFERENCE_HOLE = 0.85, 1.35, 0.0826
 IMPORT = re.compile(r'^import \{(.*?)\} from "[./\w]*?(\w+)\.js";\n', re.M | re.S)
@@ -151,7 +150,7 @@ def _hammers() -> Iterator[tuple[str, str, Scene]]:
         title = scene.title.partition(",")[0].replace("Down-the-hole hammer of ", "Down the hole, ")
         yield name, title, scene
         if name in AIR:
-            yield f"{name} chambers", f"{title}, air", with_chambers(name, PRESSURE)
+            yield f"{name} chambers", f"{title}, air", with_chambers(name, PRESSURES["pneumatic"])
 
 
 def _is_string(one: tuple[Scene, str]) -> bool:
