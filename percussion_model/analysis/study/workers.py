@@ -6,10 +6,10 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
-from multiprocessing import active_children, current_process, get_context
+from contextlib import contextmanager, suppress
+from multiprocessing import current_process, get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from threading import current_thread, main_thread
 from typing import Any
 
@@ -18,12 +18,13 @@ from percussion_model.scene.inputs import SimulationError
 
 # Exit code of a worker that came to start workers itself, since it ran the script again.
 STARTED_AGAIN = 97
-# A pool whose workers die is made anew so often.
+# So many workers may die and are replaced.
 MOST_RESTARTS = 3
-# A pool has found by then that its workers were ended [s].
-FOUND_GONE = 5.0
 # One thread a process: their matrices are small, and the processes fill the machine.
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+# What a worker that has died has sent.
+_DIED = object()
 
 Task = tuple[Any, ...]
 
@@ -34,26 +35,41 @@ def on_this_machine(
     """Do the tasks in so many processes; yield number and outcome as they end.
 
     One process is the present one. A worker that dies takes its task with it, which is
-    done again by another.
+    done again by another. What workers have begun is not waited for when this is closed.
     """
     if processes == 1:
         for number, task in enumerate(tasks):
             yield number, work(*task)
         return
-    waiting = dict(enumerate(tasks))
-    for _ in range(MOST_RESTARTS + 1):
-        try:
-            with closing(_in_a_pool(work, dict(waiting), processes)) as ended:
-                for number, outcome in ended:
-                    del waiting[number]
-                    yield number, outcome
-            return
-        except BrokenProcessPool:
-            continue
-    raise SimulationError(
-        f"worker processes died {MOST_RESTARTS + 1} times, out of memory perhaps: what is "
-        "finished is kept; run again with fewer processes"
-    )
+    end_if_started_again()
+    waiting = list(reversed(range(len(tasks))))  # the next one last
+    workers: dict[Connection, BaseProcess] = {}
+    doing: dict[Connection, int] = {}
+    deaths = 0
+    try:
+        while waiting or doing:
+            _start(work, min(processes, len(waiting) + len(doing)), workers)
+            for end in workers.keys() - doing.keys():
+                _give(end, tasks, waiting, doing)
+            ready = wait(list(doing))
+            for end in [one for one in doing if one in ready]:
+                number, outcome = doing.pop(end), _hear(end)
+                if outcome is _DIED:
+                    waiting.append(number)
+                    deaths += 1
+                    _bury(workers.pop(end), deaths)
+                    continue
+                _give(end, tasks, waiting, doing)  # before others look at the outcome
+                if isinstance(outcome, BaseException):
+                    raise outcome
+                yield number, outcome
+    finally:
+        # Pipes are read by this thread alone: a message that breaks off holds nobody up.
+        for worker in workers.values():
+            worker.terminate()
+        for end, worker in workers.items():
+            end.close()
+            worker.join()
 
 
 def end_if_started_again() -> None:
@@ -62,38 +78,62 @@ def end_if_started_again() -> None:
         sys.exit(STARTED_AGAIN)
 
 
-def _in_a_pool(
-    work: Callable[..., Any], tasks: dict[int, Task], processes: int
-) -> Generator[tuple[int, Any], None, None]:
-    end_if_started_again()
-    others, workers = set(active_children()), set()
-    pool = ProcessPoolExecutor(
-        processes, mp_context=get_context("spawn"), initializer=end_with_parent
-    )
-    running: dict[Future[Any], int] = {}
+def _start(work: Callable[..., Any], count: int, workers: dict[Connection, BaseProcess]) -> None:
+    """Start workers until there are so many, each beside this process's end of a pipe."""
+    if len(workers) >= count:
+        return
+    context = get_context("spawn")
+    with _one_thread_each(), _interrupts_left_to_this_process():
+        while len(workers) < count:
+            here, there = context.Pipe()
+            worker = context.Process(target=_serve, args=(work, there), daemon=True)
+            worker.start()
+            there.close()  # so that the pipe ends with the worker
+            workers[here] = worker
+
+
+def _give(
+    end: Connection, tasks: list[Task], waiting: list[int], doing: dict[Connection, int]
+) -> None:
+    """Send the next task, if there is one; who listens finds that a worker has died."""
+    if waiting:
+        doing[end] = waiting.pop()
+        with suppress(OSError):
+            end.send(tasks[doing[end]])
+
+
+def _hear(end: Connection) -> Any:
     try:
-        with _one_thread_each(), _interrupts_left_to_this_process():
-            for number, task in tasks.items():
-                running[pool.submit(work, *task)] = number
-        workers = set(active_children()) - others
-        while running:
-            ended, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in ended:
-                yield running.pop(future), future.result()
-    except BrokenProcessPool:
-        if any(worker.exitcode == STARTED_AGAIN for worker in workers):
-            raise SimulationError(
-                "worker processes read the script again, and would start workers themselves: put "
-                'what the script does under `if __name__ == "__main__":`'
-            ) from None
-        raise
-    finally:
-        if running:  # interrupted: what workers have begun is not waited for
-            for worker in set(active_children()) - others:
-                worker.terminate()
-            # told to shut down before it finds them gone, a pool waits for ever for one to read on
-            wait(running, timeout=FOUND_GONE)
-        pool.shutdown(wait=False, cancel_futures=True)
+        return end.recv()
+    except (EOFError, OSError):
+        return _DIED
+
+
+def _serve(work: Callable[..., Any], end: Connection) -> None:
+    """Do the tasks that come, in a process of its own, until this one is ended."""
+    end_with_parent()
+    while True:
+        task = end.recv()
+        try:
+            outcome = work(*task)
+        except Exception as error:
+            outcome = error
+        end.send(outcome)
+
+
+def _bury(worker: BaseProcess, deaths: int) -> None:
+    """Say why workers die, unless they may go on doing so."""
+    worker.join()
+    if worker.exitcode == STARTED_AGAIN:
+        raise SimulationError(
+            "worker processes read the script again, and would start workers themselves: put "
+            'what the script does under `if __name__ == "__main__":`'
+        )
+    if deaths > MOST_RESTARTS:
+        raise SimulationError(
+            f"worker processes died {deaths} times, out of memory perhaps: what is finished is "
+            "kept; run again with fewer processes"
+        )
 
 
 @contextmanager
