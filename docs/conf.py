@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 
-from percussion_model.interface.explore_page.build import is_at_hand, page_file
+from percussion_model.interface.explore.build import is_at_hand, page_file
 
 sys.path.insert(0, str(Path(__file__).parent / "site"))
 

@@ -23,7 +23,7 @@ from percussion_model.engine import library
 from percussion_model.engine.compiler import NoCompilerError, objects
 from percussion_model.engine.entries import SOLVERS
 from percussion_model.engine.platforms import PLATFORMS
-from percussion_model.interface.explore_page.build import BROUGHT, page_file
+from percussion_model.interface.explore.build import BROUGHT, page_file
 from percussion_model.interface.progress import lines
 from percussion_model.scene.scene import SceneError
 

@@ -9,11 +9,8 @@ import json
 import os
 import re
 import shutil
-import signal
-import subprocess
 import sys
 import sysconfig
-import urllib.request
 import zipfile
 from email import message_from_bytes
 from pathlib import Path
@@ -199,22 +196,6 @@ def test_a_system_is_built_valid_and_runs(installed):
 def test_a_study_is_made(installed):
     installed.percussion("study", "rigid", "--over", "feed.force=2kN:4kN:3", "--out", "map")
     assert (installed.empty / "map" / "report.html").is_file()
-
-
-def test_the_explorer_answers(installed):
-    words = [installed.program("percussion"), "explore", "rigid", "--no-browser", "--port", "0"]
-    serving = subprocess.Popen(
-        words, cwd=installed.empty, env=installed.variables, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
-    )  # fmt: skip
-    try:
-        url = serving.stdout.readline().split()[0]
-        with urllib.request.urlopen(url, timeout=60) as answer:
-            assert "Percussion explorer" in answer.read().decode()
-    finally:
-        serving.send_signal(signal.SIGINT)
-        told = serving.communicate(timeout=60)[1]
-    assert serving.returncode == 130, told
 
 
 @pytest.mark.skipif(

@@ -71,8 +71,7 @@ export class Engine {
 
   // Whether a parameter has any influence on a scene.
   matters(scene, key) {
-    const needs = Object.entries(this.rows.get(key).needs);
-    return needs.every(([need, values]) => values.includes(this.value(scene, need)));
+    return matters(this.rows, (one) => this.value(scene, one), key);
   }
 
   // Bars between piston and bit, where they are on.
@@ -184,6 +183,11 @@ export class Engine {
   }
 }
 
+// Whether a parameter has any influence, by the values of those that it needs.
+export function matters(rows, get, key) {
+  return Object.entries(rows.get(key).needs).every(([need, values]) => values.includes(get(need)));
+}
+
 // --- values in words, as Python writes them
 
 export function allowed(row, value) {
@@ -254,7 +258,7 @@ export function rateOf(blows) {
 
 export class Motion {
   constructor(engine, scene, gauge) {
-    Object.assign(this, { engine, scene, time: 0, blows: [], recordsEvents: false, _found: [], _owned: [] });
+    Object.assign(this, { engine, scene, time: 0, blows: [], recordsEvents: false, _found: [], _owned: [], _cells: {} });
     this.solver = engine.solver(scene);
     this.entries = engine.entries[this.solver];
     try {
@@ -364,24 +368,28 @@ export class Motion {
   fields(t) {
     const at = this._seen(t), { engine } = this, found = {};
     for (const [name, bar, sections] of this._bars()) {
-      const n = this.entries.cells(this._image, bar, 0, 0);
-      const form = this.entries.shape_form(this.base, at, bar);
-      const modes = this.entries.shapes(this._image, bar, form, 0);
-      const room = engine.allocate(sections.length + n * (3 + 2 * modes));
-      const masses = room + sections.length * WORD, force = masses + n * WORD, velocity = force + n * WORD;
-      const made = velocity + n * WORD;
-      this.entries.cells(this._image, bar, room, masses);
-      this.entries.shapes(this._image, bar, form, made);
+      const form = this.entries.shape_form(this.base, at, bar), key = `${name} ${form}`;
+      const { n, masses, made, modes, place } = this._cells[key] ??= this._cellsOf(bar, form, sections);
+      const force = masses + n * WORD, velocity = force + n * WORD;
       this.entries.fields(this.base, at, bar, masses, made, modes, n, force, velocity);
-      const counts = Array.from(engine.words(room, sections.length), Number);
-      const lengths = counts.flatMap((count, k) => Array(count).fill(sections[k][0] / count));
-      let top = 0;
-      const place = Float64Array.from(lengths, (length) => (top += length) - 0.5 * length);
       const [forces, velocities] = [force, velocity].map((from) => engine.numbers(from, n).slice());
-      found[name] = { place, force: forces, velocity: velocities };
-      engine.free(room);
+      found[name] = { place: place.slice(), force: forces, velocity: velocities };
     }
     return found;
+  }
+
+  // Cells of a bar and the shapes of its modes, with room for its fields.
+  _cellsOf(bar, form, sections) {
+    const n = this.entries.cells(this._image, bar, 0, 0), modes = this.entries.shapes(this._image, bar, form, 0);
+    const room = this._own(sections.length + n * (3 + 2 * modes));
+    const masses = room + sections.length * WORD, made = masses + 3 * n * WORD;
+    this.entries.cells(this._image, bar, room, masses);
+    this.entries.shapes(this._image, bar, form, made);
+    const counts = Array.from(this.engine.words(room, sections.length), Number);
+    const lengths = counts.flatMap((count, k) => Array(count).fill(sections[k][0] / count));
+    let top = 0;
+    const place = Float64Array.from(lengths, (length) => (top += length) - 0.5 * length);
+    return { n, masses, made, modes, place };
   }
 
   // Run from time zero until blows repeat within a tolerance, or so many have ended, or their rate is

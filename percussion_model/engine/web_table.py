@@ -100,8 +100,10 @@ def table() -> dict[str, Any]:
         "kinds": {name: int(kind) for name, kind in records.KINDS.items()},
         "solvers": SOLVERS,
         "parameters": [_parameter(name) for name in SCENE_NUMBERS.names or ()],
-        "section": [_row(row) for row in Section.rows.values()],
-        "joint": [_row(row) for row in Rod.rows.values() if row.kind != "sections"],
+        "section": [_row(row) | {"key": name} for name, row in Section.rows.items()],
+        "joint": [
+            _row(row) | {"key": name} for name, row in Rod.rows.items() if row.kind != "sections"
+        ],
         "units": {unit: _units(unit) for unit in QUANTITIES},
         "inputs": _inputs(),
         "image": {

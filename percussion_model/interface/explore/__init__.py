@@ -1,1 +1,1 @@
-"""The explorer: an interactive page on which the response follows sliders."""
+"""A page that runs the hammer in a browser: its sources, and how they become one file."""

@@ -139,22 +139,7 @@ def peak_stresses(fields: dict[str, StressField]) -> dict[str, BarStress]:
 
 
 def last_blow_window(result: Result) -> Window:
-    """Run a result's scene again and sample its last blow at full rate; see `blow_window`."""
-    return blow_window(result.scene, result.blows, result.duration)
-
-
-def blow_window(scene: Scene, blows: np.ndarray, duration: float, every: int = 1) -> Window:
-    """Run a scene again and sample the last of its blows.
-
-    Parameters
-    ----------
-    scene : Scene
-    blows : ndarray of BLOW
-        That it has made from its start on.
-    duration : float
-        Simulated time of that run [s].
-    every : int
-        Steps of the solver from sample to sample; 1 is the full rate.
+    """Run a result's scene again and sample its last blow at full rate.
 
     Returns
     -------
@@ -167,13 +152,14 @@ def blow_window(scene: Scene, blows: np.ndarray, duration: float, every: int = 1
     NotRepeatable
         If the scene alone does not repeat the run.
     """
+    scene, blows, duration = result.scene, result.blows, result.duration
     simulation = Simulation(scene)
     if len(blows) == 0:
         simulation.advance(duration)
         events = simulation.events
         start, length, name = _first_contact(events, duration)
         simulation = Simulation(scene)
-        return _sampled(simulation, events, name, start, length, every, is_blow=False)
+        return _sampled(simulation, events, name, start, length, is_blow=False)
     expected, period = float(blows["time"][-1]), float(blows["period"][-1])
     simulation.advance(max(0.0, expected - RESTART * period))
     before = simulation.save()
@@ -193,7 +179,7 @@ def blow_window(scene: Scene, blows: np.ndarray, duration: float, every: int = 1
     simulation.restore(before)
     start, length = float(again["time"][-1]), float(again["period"][-1])
     name = f"blow {len(blows)}, from {start:.3f} s on"
-    return _sampled(simulation, events, name, start, length, every, is_blow=True)
+    return _sampled(simulation, events, name, start, length, is_blow=True)
 
 
 def _first_contact(events: np.ndarray, duration: float) -> tuple[float, float, str]:
@@ -222,13 +208,12 @@ def _sampled(
     name: str,
     start: float,
     length: float,
-    every: int,
     is_blow: bool,
 ) -> Window:
     """Sample a stretch of the run, from just before `start`."""
     step = simulation.solver.time_step or RIGID_SAMPLING
     busy = BUSY_STEPS * step
-    step *= max(every, math.ceil(length / step / MOST_SAMPLES))
+    step *= max(1, math.ceil(length / step / MOST_SAMPLES))
     simulation.advance(max(simulation.time, start - LEAD * length))
     restart = simulation.save()
     times = np.append(np.arange(simulation.time, start, step), start + np.arange(0.0, length, step))
@@ -256,14 +241,12 @@ def _worth_sampling(times: np.ndarray, start: float, busy: float, events: np.nda
     return chosen
 
 
-def stress_fields(window: Window, every: int = 1) -> dict[str, StressField]:
+def stress_fields(window: Window) -> dict[str, StressField]:
     """Stress in the elastic bars during the window's first waves.
 
     Parameters
     ----------
     window : Window
-    every : int
-        Steps of the solver from column to column.
 
     Returns
     -------
@@ -281,7 +264,6 @@ def stress_fields(window: Window, every: int = 1) -> dict[str, StressField]:
     }
     if not bars or not step:
         return {}
-    step *= every
     shown = TRANSITS_SHOWN * max(bar.transit_time for bar in bars.values())
     first = math.ceil(max(window.origin / step - 1.0, window.restart.time / step))
     count = math.ceil(min(shown, window.length) / step)

@@ -26,6 +26,9 @@ export function stressColour(share) {
   return rest.map((one, k) => Math.round(one + part * (end[k] - one)));
 }
 
+// What is longer is measured in other units [m].
+const LONG = 3;
+
 export class Figures {
   constructor(scrub, choose) {
     const canvas = id => document.getElementById(id);
@@ -73,9 +76,9 @@ export class Figures {
     }
   }
 
-  // Stress over time and depth, piston above bit.
+  // Stress over time and depth, piston above what it strikes.
   drawWaves(blow, x) {
-    const [unit, factor] = unitOf("length", this.imperial), height = blow.fields.reduce((sum, one) => sum + one.edges.at(-1), 0);
+    const height = blow.fields.reduce((sum, one) => sum + one.edges.at(-1), 0), [unit, factor] = unitOf(height > LONG ? "distance" : "length", this.imperial);
     this.waves.begin(x, [factor * height, 0], "time, ms", `place, ${unit}`);
     if (!blow.fields.length) return;
     const pen = this.waves.pen, wide = Math.max(Math.round(this.waves.right - this.waves.left), 2);
@@ -94,8 +97,11 @@ export class Figures {
       pen.drawImage(patch, this.waves.left, y, this.waves.right - this.waves.left, end - y);
       top += field.edges.at(-1);
     }
-    const [first] = blow.fields;
-    this.waves.line([[x[0], factor * first.edges.at(-1)], [x[1], factor * first.edges.at(-1)]], "ink", 1);
+    top = 0;
+    for (const field of blow.fields.slice(0, -1)) {
+      top += factor * field.edges.at(-1);
+      this.waves.line([[x[0], top], [x[1], top]], "ink", 1);
+    }
   }
 
   // Energies over time, one on the other.
@@ -155,13 +161,13 @@ export function prepared(blow, scene) {
   for (const name of ["bit_force", "contact_force"]) greatest[name] = columns[name].reduce((a, b) => Math.max(a, b), 0);
   greatest.stress = blow.fields.reduce((most, one) => one.stress.reduce((a, b) => Math.max(a, Math.abs(b)), most), 1);
   const start = columns.bit_end_position[before(time, 0)], depth = columns.bit_end_position.map(one => one - start);
-  const bars = [scene.preset.piston, scene.preset.bit], [piston] = bars.map(bar => bar.reduce((sum, [length, area, , density]) => sum + length * area * density, 0));
+  const bars = scene.bars, [piston] = bars.slice(0, 1).map(bar => bar.reduce((sum, [length, area, , density]) => sum + length * area * density, 0));
   let work = 0;
   const rock = Float64Array.from(time, (_, k) => {
     if (k) work += 0.5 * (columns.bit_force[k] + columns.bit_force[k - 1]) * (depth[k] - depth[k - 1]);
     return work;
   });
-  const strain = Float64Array.from(time, t => blow.fields.reduce((sum, one, which) => sum + strainEnergy(one, bars[which], t), 0));
+  const strain = Float64Array.from(time, t => blow.fields.reduce((sum, one) => sum + strainEnergy(one, bars[one.bar], t), 0));
   const parts = [
     ["rock", "grey", rock], ["strain", "contact", strain], ["bit", "third", columns.bit_kinetic_energy],
     ["piston", "rock", columns.piston_velocity.map(v => 0.5 * piston * v * v)],

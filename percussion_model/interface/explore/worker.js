@@ -1,7 +1,7 @@
 // The worker: answers the newest wish of the page, the rate first, then all that takes longer.
 import { Engine, EngineError } from "../../engine/engine.js";
 import { afterSettling, numbersOver, rateOfBlows, settle } from "./settle.js";
-import { withErrors } from "./grid_error.js";
+import { LONGEST, errorsOf, withErrors } from "./grid_error.js";
 import { keepTables } from "./kept.js";
 import { picture } from "./picture.js";
 
@@ -66,9 +66,7 @@ async function answer(wish) {
     tellRate(tell, found);
     await pause(id);
     tell("picture", { picture: await picture(motion, wish, keep) });
-    // of waves in few steps nothing is known here
-    const isKnown = motion.solver === "modal" && found.kind !== "stalled" && found.rate !== 0;
-    tell("errors", isKnown ? await withErrors(found, motion, wish.known, start, keep) : { errors: {} });
+    tell("errors", await errors(found, motion, wish, start, keep));
     for (const { key, places } of wish.curves) {
       for (const x of places) tell("point", { curve: key, x, rate: await rateAt(() => start({ [key]: x }), keep) });
     }
@@ -76,6 +74,13 @@ async function answer(wish) {
   } finally {
     motion.free();
   }
+}
+
+// Rigid bodies move in closed form; how far waves are off is known to the package alone.
+async function errors(found, motion, { known, scene }, start, keep) {
+  const hasRate = found.kind !== "stalled" && found.rate !== 0;
+  if (hasRate && motion.solver === "modal" && (scene.values["solver.accuracy"] ?? null) === null) return withErrors(found, motion, known, start, keep);
+  return { errors: hasRate && motion.solver === "rigid" && !LONGEST[known.drive] ? errorsOf(found, {}) : {} };
 }
 
 function tellRate(tell, { kind, order, rate, multiplier, counted, blows }) {
@@ -98,10 +103,10 @@ async function rateAt(begin, keep) {
 }
 
 // How far the rate lies off where rock and bit are others within what is known of them, by runs of
-// rigid bodies (analysis/rock_interval.py).
+// rigid bodies where there are no rods (analysis/rock_interval.py).
 async function interval(wish, start, tell, keep) {
   const rigid = values => {
-    const one = start({ ...values, "piston.model": "rigid", "bit.model": "rigid" });
+    const one = start(wish.interval.isString ? values : { ...values, "piston.model": "rigid", "bit.model": "rigid" });
     try {
       one.runUntil(DURATION);
       return rateOfBlows(one.blows.filter(blow => blow.time >= SETTLE && blow.time + blow.period <= DURATION))[0];

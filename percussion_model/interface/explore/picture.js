@@ -1,7 +1,5 @@
 // One blow at full rate: what a sample has, and the stress in both bars.
-import { keepShapes } from "./kept.js";
-
-const STEPS = 24, BUSY_SAMPLES = 1600, QUIET_SAMPLES = 500, BEFORE = 0.02, PATIENCE = 4, PIECE = 200;
+const STEPS = 24, BUSY_SAMPLES = 1600, QUIET_SAMPLES = 500, BEFORE = 0.02, PATIENCE = 4, PIECE = 200, MOST_COLUMNS = 1000;
 
 // The state of a motion, to come back to.
 function saved(motion) {
@@ -27,7 +25,7 @@ export async function picture(motion, { scene, busy: longest, known }, keep) {
       ...(busy < blow.period ? even(blow.time + busy, blow.period - busy, QUIET_SAMPLES) : []), blow.time + blow.period];
     const columns = await sampled(motion, times, keep);
     restore();
-    const fields = await stresses(motion, scene, blow, times, busy, Math.min(...known.transits) / STEPS, keep);
+    const fields = await stresses(motion, scene, blow, times, busy, Math.max(Math.min(...known.transits) / STEPS, busy / MOST_COLUMNS), keep);
     return { time: Float64Array.from(times, t => t - blow.time), columns, fields, period: blow.period, busy };
   } finally {
     restore();
@@ -51,22 +49,28 @@ async function sampled(motion, times, keep) {
 async function stresses(motion, scene, blow, times, busy, step, keep) {
   let next = -Infinity, count = 0;
   const chosen = times.filter(t => t >= next && (next = t + (t < blow.time + busy ? step : 0)) > -Infinity);
-  const found = new Map(), release = keepShapes(motion);
-  try {
-    for (const t of chosen) {
-      for (const [bar, { place, force }] of Object.entries(motion.fields(t))) {
-        if (!found.has(bar)) found.set(bar, { ...cellsOf(scene[bar], place), time: new Float64Array(chosen.length), stress: new Float32Array(chosen.length * place.length) });
-        const { areas, time, stress } = found.get(bar);
-        time[count] = t - blow.time;
-        stress.set(force.map((one, cell) => one / areas[cell]), count * place.length);
-      }
-      count += 1;
-      await keep();
+  const found = new Map();
+  for (const t of chosen) {
+    for (const [bar, { place, force }] of Object.entries(motion.fields(t))) {
+      if (!found.has(bar)) found.set(bar, { ...numbered(scene, bar), ...cellsOf(sectionsOf(scene, bar), place), time: new Float64Array(chosen.length), stress: new Float32Array(chosen.length * place.length) });
+      const { areas, time, stress } = found.get(bar);
+      time[count] = t - blow.time;
+      stress.set(force.map((one, cell) => one / areas[cell]), count * place.length);
     }
-  } finally {
-    release();
+    count += 1;
+    await keep();
   }
   return [...found.values()];
+}
+
+// Number of a bar from the top.
+function numbered({ rods }, bar) {
+  return { bar: bar === "piston" ? 0 : bar.startsWith("rod ") ? Number(bar.slice(4)) : rods.length + 1 };
+}
+
+// Sections of a bar: "piston", "rod 1", ..., "bit".
+function sectionsOf(scene, bar) {
+  return bar.startsWith("rod ") ? scene.rods[bar.slice(4) - 1].sections : scene[bar];
 }
 
 // Ends of the cells of a bar by their middles, and their areas.

@@ -33,23 +33,3 @@ export function keepTables(engine) {
   }
   return engine;
 }
-
-// Let a motion keep the shapes of its modes, which else are made for each reading; a function that
-// ends it.
-export function keepShapes({ engine, entries, _image: own }) {
-  const make = entries.shapes, made = new Map();
-  entries.shapes = (image, bar, form, out) => {
-    if (image !== own) return make(image, bar, form, out);
-    const key = `${bar} ${form}`, words = 2 * entries.cells(image, bar, 0, 0);
-    if (!made.has(key)) {
-      const modes = make(image, bar, form, 0), room = engine.allocate(words * modes);
-      make(image, bar, form, room);
-      made.set(key, { modes, numbers: engine.numbers(room, words * modes).slice() });
-      engine.free(room);
-    }
-    const { modes, numbers } = made.get(key);
-    if (out) engine.numbers(out, numbers.length).set(numbers);
-    return modes;
-  };
-  return () => { entries.shapes = make; };
-}

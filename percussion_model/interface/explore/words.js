@@ -16,7 +16,7 @@ export const WORDS = {
   undecided: "undecided",
   numerical: "± {error} by the computation",
   noError: "error of the computation: being estimated …",
-  errorUnknown: "error of the computation not known",
+  errorUnknown: "error of the computation: percussion settled estimates it",
   rockError: "{low} to {high} by what is known of the rock ({rock}) and the bit. Drills differ further: up to a factor 2 without a calibration on site.",
   rockMissing: "What the rock leaves open is told for a bit that breaks rock: choose one.",
   rockWaiting: "What the rock leaves open is being sampled …",
@@ -27,7 +27,6 @@ export const WORDS = {
   play: "Play", pause: "Pause",
   light: "Light", dark: "Dark", metric: "Metric units", imperial: "Imperial units",
   pin: "Pin to compare", unpin: "Remove pinned",
-  needsServer: "rods, by percussion run",
   given: "as given",
   tooLong: "No stationary response within {seconds} s of computing, which is the limit here: percussion settled of this scene may take longer.",
   drawn: "Piston, bit and rock in slow motion. Greatest stress {mega} MPa, greatest force on the rock {force} kN.",
@@ -36,6 +35,8 @@ export const WORDS = {
   engine: "This browser cannot run the engine: {why}",
   oldLink: "This link was made by version {theirs}; this page is version {ours}. Numbers may differ.",
   badLink: "In the link, {why}",
+  notWhole: "the scene is not whole.",
+  noSuch: "{key}: there is no such parameter.",
   about: "percussion_model {version}. Piston and bit are elastic bars, the rock follows a law with memory. All is computed on this machine; nothing is sent.",
   compression: "compression", tension: "tension",
   drive: "drive", feed: "feed",
@@ -45,18 +46,40 @@ export const WORDS = {
 // Sliders: key of the table, name, kind of unit, where it reaches [SI], and when it is shown.
 export const SLIDERS = [
   { key: "feed.force", name: "Feed", onCasing: "Feed on the casing", unit: "force", low: 0, high: 20e3 },
-  { key: "drive.force", name: "Drive force on the piston", unit: "force", low: 500, high: 20e3, drive: "pressure" },
-  { key: "pneumatic.supply_pressure", name: "Air pressure", unit: "pressure", low: 4e5, high: 35e5, drive: "pneumatic" },
-  { key: "drive.reversal_distance", name: "Stroke: where the drive turns", unit: "length", low: 0.005, high: 0.1, drive: "pressure" },
-  { key: "rotation.speed", name: "Rotation", unit: "turns", low: 0, high: 15.7, needs: "effects.rotation" },
+  { key: "drive.force", name: "Drive force on the piston", unit: "force", low: 500, high: 20e3 },
+  { key: "pneumatic.supply_pressure", name: "Air pressure", unit: "pressure", low: 4e5, high: 35e5 },
+  { key: "hydraulic.supply_pressure", name: "Oil pressure", unit: "pressure", low: 60e5, high: 250e5 },
+  { key: "drive.reversal_distance", name: "Stroke: where the drive turns", unit: "length", low: 0.005, high: 0.1 },
+  { key: "rotation.speed", name: "Rotation", unit: "turns", low: 0, high: 15.7 },
 ];
 export const OTHERS = [
   { key: "rock.loading_stiffness", name: "Rock stiffness, loading", unit: "stiffness", low: 1e8, high: 3e9 },
   { key: "rock.unloading_ratio", name: "Unloading by loading stiffness", unit: "ratio", low: 1.1, high: 20 },
   { key: "rock.barrier_energy", name: "Energy barrier", unit: "energy", low: 0, high: 0.5 },
-  { key: "breaking.crushing_energy", name: "Crushing energy", unit: "specific", low: 10e6, high: 150e6, needs: "effects.breaking" },
+  { key: "breaking.crushing_energy", name: "Crushing energy", unit: "specific", low: 10e6, high: 150e6 },
   { key: "loss.time", name: "Loss time of steel", unit: "microseconds", low: 5e-8, high: 2e-6 },
-  { key: "feed.casing_mass", name: "Mass of the casing", unit: "mass", low: 0, high: 300, on: "casing" },
+  { key: "drive.external_force", name: "Given force on the piston", unit: "force", low: -20e3, high: 20e3 },
+  { key: "feed.casing_mass", name: "Mass of the casing", unit: "mass", low: 0, high: 300 },
+];
+
+// Lengths of sections, from top to bottom.
+export const LENGTHS = [["piston", "Piston"], ["bit", "Bit"]].flatMap(([bar, name]) => [0, 1, 2, 3, 4, 5].map(k =>
+  ({ key: `${bar}.sections.${k}.length`, name: `${name}, length of section ${k + 1}`, unit: "length", low: 0.02, high: 0.5 })));
+
+// Switches and choices: key of the table, name, and the words of its choices.
+export const CHOICES = [
+  { key: "effects.breaking", name: "Hole advances by the volume broken" },
+  { key: "effects.rotation", name: "Bit turns" },
+  { key: "effects.cuttings", name: "Cuttings stay in the crater" },
+  { key: "effects.barrier", name: "Energy barrier before the rock breaks" },
+  { key: "effects.loss", name: "Loss in the steel" },
+  { key: "effects.gravity", name: "Weight of piston and bit" },
+  { key: "effects.joints", name: "Joints of the rods" },
+  { key: "effects.damper", name: "Damper on the shank" },
+  { key: "effects.rock", name: "Rock law", words: { bilinear: "two straight lines", power: "power law", spring: "spring without loss", wall: "rigid wall", none: "no rock" } },
+  { key: "piston.model", name: "Piston", words: { elastic: "elastic", rigid: "rigid" } },
+  { key: "bit.model", name: "Bit", words: { elastic: "elastic", rigid: "rigid" } },
+  { key: "feed.on", name: "Feed pushes", words: { bit: "the bit", casing: "the casing" } },
 ];
 
 // Numbers beside the rate: key, name, kind of unit.
@@ -78,6 +101,7 @@ export const UNITS = {
   load: [["kN", 1e-3], ["klbf", 1e-3 / 4.4482216152605]],
   pressure: [["bar", 1e-5], ["psi", 1 / 6894.757293168]],
   length: [["mm", 1e3], ["in", 1 / 0.0254]],
+  distance: [["m", 1], ["ft", 1 / 0.3048]],
   turns: same("rpm", 30 / Math.PI),
   stiffness: [["kN/mm", 1e-6], ["klbf/in", 1 / 175126.83524647]],
   ratio: same("", 1),

@@ -1,7 +1,8 @@
 // Cards of hammers, bits and rocks, and sliders with a field each.
 import { short, unitOf } from "./numbers.js";
 import { bitPicture, hammerPicture, rockPicture } from "./pictures.js";
-import { OTHERS, SLIDERS, WORDS } from "./words.js";
+import { OWN } from "./own.js";
+import { CHOICES, LENGTHS, OTHERS, SLIDERS, WORDS } from "./words.js";
 
 const STEPS = 400;
 
@@ -14,11 +15,10 @@ export function shorter(title) {
   return title.replace("Granite of a continuum model", "Model granite").replace(", by its strength", "").replace(" of the reference scene", "");
 }
 
-// Cards of one group: names with pictures and titles; refused ones say why.
+// Cards of one group: names with pictures and titles.
 function cards(box, group, options, chosen, choose) {
-  box.innerHTML = options.map(({ name, title, picture, refused }) =>
-    `<label${refused ? ` title="${escaped(refused)}"` : ""}><input type="radio" name="${group}" value="${escaped(name)}"${name === chosen ? " checked" : ""}${refused ? " disabled" : ""}>` +
-    `${picture}<span>${escaped(title)}${refused ? `: ${escaped(refused)}` : ""}</span></label>`).join("");
+  box.innerHTML = options.map(({ name, title, picture }) =>
+    `<label><input type="radio" name="${group}" value="${escaped(name)}"${name === chosen ? " checked" : ""}>${picture}<span>${escaped(title)}</span></label>`).join("");
   box.onchange = event => choose(event.target.value);
 }
 
@@ -27,32 +27,34 @@ export class Inputs {
   constructor(get, change) {
     Object.assign(this, { get, change, imperial: false, entries: [] });
     this.boxes = ["hammers", "bits", "rocks"].map(id => document.getElementById(id));
-    for (const [id, rows] of [["sliders", SLIDERS], ["others", OTHERS]]) {
+    for (const [id, rows] of [["sliders", SLIDERS], ["others", [...OTHERS, ...LENGTHS]]]) {
       for (const row of rows) this.entries.push(new Entry(row, document.getElementById(id), this));
     }
+    for (const row of CHOICES) this.entries.push(new Choice(row, document.getElementById("choices"), this));
   }
 
   // Show a scene: cards that fit, sliders where they are.
   show() {
     const scene = this.get(), { hammers, bits, rocks } = scene.tables;
-    const focused = document.activeElement?.name, own = scene.base, ownBit = scene.preset.bit_name;
+    const focused = document.activeElement?.name, { base } = scene, ownBit = scene.preset.bit_name;
     const change = values => this.change(Object.assign(scene.with({}), values));
     for (const entry of this.entries) entry.show(scene, this.imperial);
     const chosen = [scene.hammer, scene.bit, scene.rock].join();
     if (chosen === this.chosen) return;
     this.chosen = chosen;
-    cards(this.boxes[0], "hammer", Object.entries(hammers).map(([name, one]) =>
-      ({ name, title: one.title, picture: hammerPicture(scene.tables.presets[name], one), refused: one.refused && WORDS.needsServer })),
+    const all = Object.entries(hammers).sort(([one], [other]) => (other === OWN) - (one === OWN));
+    cards(this.boxes[0], "hammer", all.map(([name, one]) =>
+      ({ name, title: one.title, picture: hammerPicture(scene.tables.presets[name], one) })),
       scene.hammer, name => change({ hammer: name, bit: hammers[name].bits.includes(scene.bit) ? scene.bit : scene.tables.presets[name].bit_name, values: {} }));
-    const free = ownBit ? [] : [{ name: "", title: WORDS.given, picture: bitPicture({ diameter: own.hole, buttons: 9, gauge: 6 }) }];
-    cards(this.boxes[1], "bit", [...free, ...own.bits.map(name => ({ name, title: bits[name].short, picture: bitPicture(bits[name]) }))],
+    const free = ownBit ? [] : [{ name: "", title: WORDS.given, picture: bitPicture({ diameter: base.hole, buttons: 9, gauge: 6 }) }];
+    cards(this.boxes[1], "bit", [...free, ...base.bits.map(name => ({ name, title: bits[name].short, picture: bitPicture(bits[name]) }))],
       scene.bitName, name => change({ bit: name, values: this.without(["breaking.", "rotation."]) }));
     cards(this.boxes[2], "rock", [{ name: "", title: WORDS.given, picture: rockPicture("hard") },
       ...Object.entries(rocks).map(([name, one]) => ({ name, title: one.title, picture: rockPicture(name) }))].map(one => ({ ...one, title: shorter(one.title) })),
       scene.rock, name => change({ rock: name, values: this.without(["rock.", "breaking.crushing_energy"]) }));
     for (const box of this.boxes) {
-      const own = box.querySelector("input:checked")?.parentNode;
-      if (own) box.scrollLeft = own.offsetLeft - 0.5 * (box.clientWidth - own.clientWidth);
+      const card = box.querySelector("input:checked")?.parentNode;
+      if (card) box.scrollLeft = card.offsetLeft - 0.5 * (box.clientWidth - card.clientWidth);
     }
     if (["hammer", "bit", "rock"].includes(focused)) document.querySelector(`input[name=${focused}]:checked`)?.focus();
   }
@@ -64,6 +66,26 @@ export class Inputs {
 
   set(key, value) {
     this.change(this.get().with({ [key]: value }));
+  }
+}
+
+// A tick, or a choice of words.
+class Choice {
+  constructor(row, box, inputs) {
+    Object.assign(this, { ...row, inputs, box: document.createElement("label") });
+    this.box.className = "choice";
+    const options = Object.entries(this.words ?? {}).map(([value, word]) => `<option value="${value}">${escaped(word)}</option>`).join("");
+    this.box.innerHTML = this.words ? `<span>${escaped(this.name)}</span> <select>${options}</select>` : `<input type="checkbox"> <span>${escaped(this.name)}</span>`;
+    this.input = this.box.querySelector("input, select");
+    this.input.addEventListener("change", () => inputs.set(this.key, this.words ? this.input.value : this.input.checked));
+    box.append(this.box);
+  }
+
+  show(scene) {
+    const value = scene.get(this.key);
+    this.box.hidden = !scene.matters(this.key) || Boolean(this.words && !(value in this.words));
+    this.box.title = scene.tables.rows.get(this.key).description;
+    if (this.words) this.input.value = value; else this.input.checked = value;
   }
 }
 
@@ -87,8 +109,7 @@ class Entry {
   }
 
   show(scene, imperial) {
-    const drive = scene.get("effects.drive");
-    const shown = (!this.drive || this.drive === drive) && (!this.needs || scene.get(this.needs)) && (!this.on || scene.get("feed.on") === this.on);
+    const shown = scene.matters(this.key);
     this.box.hidden = !shown;
     this.box.style.display = shown ? "" : "none";
     const name = this.onCasing && scene.get("feed.on") === "casing" ? this.onCasing : this.name;

@@ -6,7 +6,7 @@ import { unitOf } from "./numbers.js";
 import { Player } from "./player.js";
 import { showResult, numberTexts } from "./result.js";
 import { Scene } from "./scene.js";
-import { SLIDERS, WORDS, fill } from "./words.js";
+import { LENGTHS, SLIDERS, WORDS, fill } from "./words.js";
 
 const part = id => document.getElementById(id);
 const START = { hammer: "dth4", bit: "dth-115", rock: "kuru-granite" };
@@ -50,14 +50,15 @@ function fail(why) {
 
 // Tables of the engine and of the page as scenes take them.
 function tablesOf(table, catalogue) {
-  const { presets, rocks } = table, bits = { ...table.bits };
+  const { presets, rocks, section } = table, bits = { ...table.bits };
   for (const [name, more] of Object.entries(catalogue.bits)) bits[name] = { ...bits[name], ...more };
-  return { ...catalogue, presets, bits, rocks, rows: new Map(table.parameters.map(row => [row.key, row])) };
+  const rows = [...table.parameters, ...LENGTHS.map(({ key }) => ({ ...section[0], key, needs: {} }))];
+  return { ...catalogue, presets, bits, rocks, section, rows: new Map(rows.map(row => [row.key, row])) };
 }
 
 // A scene, and what the worker must know besides.
 function wishOf(scene) {
-  const { transits } = scene.base, get = key => scene.get(key), drive = get("effects.drive");
+  const transits = scene.bars.map(transit), get = key => scene.get(key), drive = get("effects.drive");
   return {
     scene: scene.whole, busy: 1.6 * tables.transits * Math.max(...transits),
     mostTime: MOST_TIME, tooLong: fill(WORDS.tooLong, { seconds: MOST_TIME / 1000 }),
@@ -70,6 +71,11 @@ function wishOf(scene) {
   };
 }
 
+// Time in which a wave crosses a bar [s].
+function transit(bar) {
+  return bar.reduce((sum, [length, , modulus, density]) => sum + length * Math.sqrt(density / modulus), 0);
+}
+
 // Samples of what is known of rock and bit, as analysis/rock_interval.py takes them.
 function intervalOf(scene) {
   const known = scene.rock && tables.uncertain[scene.bitName]?.[scene.rock];
@@ -80,7 +86,7 @@ function intervalOf(scene) {
     const share = shares[k], [from, to, part] = share >= 0.5 ? [value, high, 2 * share - 1] : [low, value, 2 * share];
     return [key, from <= 0 ? from + part * (to - from) : from * (to / from) ** part];
   })));
-  return { samples };
+  return { samples, isString: scene.get("effects.string") };
 }
 
 function ask() {
@@ -173,6 +179,7 @@ function drawCurves(only) {
 
 // Words for those who do not see the pictures.
 function describe() {
+  part("waves").parentNode.hidden = !state.blow.fields.length;
   const { greatest, period } = state.blow, mega = (1e-6 * greatest.stress).toFixed(0), force = (1e-3 * greatest.bit_force).toFixed(0);
   part("drawing").setAttribute("aria-label", fill(WORDS.drawn, { mega, force }));
   for (const id of ["waves", "forces", "path", "energy"]) part(id).setAttribute("aria-label", fill(WORDS.plotted, { what: part(id).previousElementSibling.textContent, period: (1e3 * period).toFixed(1), force, mega }));
@@ -286,6 +293,6 @@ player = new Player(t => { drawing.frame(t); figures.frame(t); });
 inputs = new Inputs(() => state.scene, change);
 part("about").textContent = fill(WORDS.about, { version: tables.version });
 listen();
-start(location.hash);
+start(location.hash || `#${part("own").textContent}`);
 globalThis.explorer = { state, tables, player, take, change: values => change(state.scene.with(values)), show: change, Scene };
 startWorker().catch(error => fail(String(error?.message ?? error)));

@@ -18,9 +18,9 @@ export function seedOf(text) {
   return [...text].reduce((sum, letter) => Math.imul(sum, 31) + letter.charCodeAt(0) >>> 0, 7);
 }
 
-// Piston and bit of a hammer, lying, to one scale for all; rods where they are refused.
-export function hammerPicture({ piston, bit }, { air, refused }) {
-  if (refused) {
+// Piston and bit of a hammer, lying, to one scale for all; rods where there are some.
+export function hammerPicture({ piston, bit, rods }, { air }) {
+  if (rods.length) {
     const rods = [8, 34, 60].map(x => `<rect x="${x}" y="24" width="24" height="7" fill="var(--steel)" stroke="var(--soft)"/>`);
     return svg(112, 56, `${rods.join("")}<rect x="86" y="20" width="12" height="15" fill="var(--stone-dark)"/>`);
   }

@@ -14,10 +14,10 @@ from typing import Any
 from percussion_model.analysis.rock_interval import SAMPLES, sample_shares, uncertain_numbers
 from percussion_model.engine import library, wasm
 from percussion_model.engine.compiler import Report
-from percussion_model.engine.web_table import PRESSURES
+from percussion_model.engine.web_table import PRESSURES, scene_as_json, table
 from percussion_model.interface.plotting.window import TRANSITS_SHOWN
 from percussion_model.scene.bits import bit, bits
-from percussion_model.scene.hammers import AIR, hammer, hammers, with_chambers
+from percussion_model.scene.hammers import AIR, CHAMBERS, hammer, hammers, with_chambers
 from percussion_model.scene.rocks import rock, rocks
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.scene import Scene
@@ -29,20 +29,22 @@ BROUGHT = HERE / NAME
 # Where a clone has the engine for browsers.
 FOLDER = HERE.parents[2] / "dist" / "web"
 # Modules of page and worker, each after those that it takes from.
-PAGE = ("words", "numbers", "scene", "pictures", "plot", "figures", "drawing", "inputs", "result",
-        "player", "main")  # fmt: skip
+PAGE = ("words", "numbers", "own", "scene", "pictures", "plot", "figures", "drawing", "inputs",
+        "result", "player", "main")  # fmt: skip
 WORKER = ("settle", "grid_error", "kept", "picture", "worker")
 # Bits that go with a hammer, by the diameter of its hole; the reference bores 3 1/4 inches.
 LEAST_HOLE, MOST_HOLE, REFERENCE_HOLE = 0.85, 1.35, 0.0826
 IMPORT = re.compile(r'^import \{(.*?)\} from "[./\w]*?(\w+)\.js";\n', re.M | re.S)
+# Where the page holds a scene to begin with, and how one without a title is called.
+OWN, OWN_TITLE = '<script id="own" type="text/plain"></script>', "Your own scene"
 # Most numbers of rock and bit that are known by intervals.
 MOST_UNCERTAIN = 8
 
 
 def is_at_hand() -> bool:
     """Whether the engine for browsers is there, made of the present sources."""
-    table = FOLDER / "table.json"
-    return table.is_file() and json.loads(table.read_text("utf-8"))["stamp"] == library.stamp()
+    kept = FOLDER / "table.json"
+    return kept.is_file() and json.loads(kept.read_text("utf-8"))["stamp"] == library.stamp()
 
 
 def engine_folder(report: Report | None = None) -> Path:
@@ -80,13 +82,13 @@ def page(engine: Path) -> str:
     Parameters
     ----------
     engine : Path
-        Folder with `engine.wasm` and `table.json`.
+        Folder with `engine.wasm`.
     """
     packed = gzip.compress((engine / "engine.wasm").read_bytes(), 9, mtime=0)
     own = wasm.SCRIPT.read_text("utf-8")
     parts = {
         "STYLE": _source("style.css"),
-        "TABLE": _as_json(_less(json.loads((engine / "table.json").read_text("utf-8")))),
+        "TABLE": _as_json(_less(table())),
         "CATALOGUE": _as_json(catalogue()),
         "ENGINE": base64.b64encode(packed).decode(),
         "WORKER": joined({"engine": own} | {name: _source(f"{name}.js") for name in WORKER}),
@@ -99,12 +101,32 @@ def _as_json(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
 
 
-def _less(table: dict[str, Any]) -> dict[str, Any]:
+def _less(whole: dict[str, Any]) -> dict[str, Any]:
     """The table without what the page does not show."""
     kept = {name for name, *_ in _hammers()}
-    return table | {
-        "presets": {name: one for name, one in table["presets"].items() if name in kept}
+    return whole | {
+        "presets": {name: one for name, one in whole["presets"].items() if name in kept}
     }
+
+
+def with_scene(page: str, scene: Scene) -> str:
+    """A page that begins with a scene.
+
+    Parameters
+    ----------
+    page : str
+        As of `page`, as HTML.
+    scene : Scene
+    """
+    return page.replace(OWN, OWN.replace("><", f">{own_link(scene)}<"))
+
+
+def own_link(scene: Scene) -> str:
+    """A scene as the part of an address after the number sign."""
+    title = scene.title or OWN_TITLE
+    whole = {"preset": scene_as_json(scene), "hammer": _hammer(scene, title)}
+    letters = base64.urlsafe_b64encode(json.dumps(whole, separators=(",", ":")).encode())
+    return f"own={letters.decode().rstrip('=')}"
 
 
 def _source(name: str) -> str:
@@ -132,12 +154,11 @@ def catalogue() -> dict[str, Any]:
         own = version("percussion_model")
     except PackageNotFoundError:
         own = "0"
-    down = [name for name in bits() if name.startswith("dth")]
     return {
         "version": own,
         "hammers": {name: _hammer(scene, title) for name, title, scene in _hammers()},
-        "bits": {name: _bit(name) for name in down},
-        "uncertain": {name: _uncertain(name) for name in down},
+        "bits": {name: _bit(name) for name in bits()},
+        "uncertain": {name: _uncertain(name) for name in bits()},
         "shares": {count: sample_shares(SAMPLES, count) for count in range(1, MOST_UNCERTAIN + 1)},
         "transits": TRANSITS_SHOWN,
     }
@@ -149,8 +170,9 @@ def _hammers() -> Iterator[tuple[str, str, Scene]]:
     for scene, name in sorted(((hammer(name), name) for name in hammers()), key=_is_string):
         title = scene.title.partition(",")[0].replace("Down-the-hole hammer of ", "Down the hole, ")
         yield name, title, scene
-        if name in AIR:
-            yield f"{name} chambers", f"{title}, air", with_chambers(name, PRESSURES["pneumatic"])
+        if name in CHAMBERS:
+            drive, what = ("pneumatic", "air") if name in AIR else ("hydraulic", "oil")
+            yield f"{name} chambers", f"{title}, {what}", with_chambers(name, PRESSURES[drive])
 
 
 def _is_string(one: tuple[Scene, str]) -> bool:
@@ -158,16 +180,14 @@ def _is_string(one: tuple[Scene, str]) -> bool:
 
 
 def _hammer(scene: Scene, title: str) -> dict[str, Any]:
-    if scene.effects.string:
-        return {"title": title, "refused": True}
+    kind = "th-" if scene.effects.string else "dth-"
     hole = scene.hole_diameter or REFERENCE_HOLE
     return {
         "title": title,
         "air": scene.effects.drive == "pneumatic",
         "toml": scene.to_toml(),
         "hole": hole,
-        "transits": [scene.piston.transit_time, scene.bit.transit_time],
-        "bits": [name for name in bits() if name.startswith("dth")
+        "bits": [name for name in bits() if name.startswith(kind)
                  and LEAST_HOLE < bit(name).diameter / hole < MOST_HOLE],
     }  # fmt: skip
 

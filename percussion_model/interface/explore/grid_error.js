@@ -8,7 +8,7 @@ const UNSURE = 6, UNSURE_OTHERWISE = 0.02, BEYOND = 1.2, NEAR = 3, FAR = 0.07;
 const CALIBRATED = [[1e-1, 14], [2e-2, 20], [1e-2, 28], [1e-3, 56], [1e-4, 128]];
 const FEWEST_JUDGED = 12, STALLED_AFTER = 2, LONGER_STEPS = Math.SQRT2, ROUNDING = 1e-12;
 const RATE = "rate_of_penetration";
-const LONGEST = { pneumatic: 1e-3, hydraulic: 1e-3 };
+export const LONGEST = { pneumatic: 1e-3, hydraulic: 1e-3 };
 
 // Modes that are asked for in the first bar; there are whole lanes of them.
 function asked({ transits: [first, shortest], cells }) {
@@ -153,7 +153,7 @@ export async function withErrors(found, motion, scene, start, keep) {
 }
 
 // The whole errors: of settling and grid.
-function errorsOf(found, grid) {
+export function errorsOf(found, grid) {
   const { order, counted, blows } = found, errors = {};
   const join = (name, settling) => {
     const error = order ? settling + (grid[name] ?? 0) : Math.max(settling, grid[name] ?? 0);

@@ -7,6 +7,8 @@ import { WORDS, fill } from "./words.js";
 
 // The bit's end moves by millimetres: it is shown so many times as far.
 const MAGNIFIED = 10;
+// Of the widest part, by the width of the picture: rods would be lines.
+const LEAST_WIDTH = 0.2;
 // Chips fly with this speed [m/s].
 const FLIGHT = 4;
 
@@ -18,7 +20,7 @@ export class Drawing {
   // Take another blow: its scene says what it looks like.
   take(blow, scene, imperial, [from, to]) {
     Object.assign(this, { blow, scene, imperial });
-    const { preset, base, tables } = scene, bit = scene.bitName && tables.bits[scene.bitName], bars = [preset.piston, preset.bit];
+    const { base, tables, bars } = scene, bit = scene.bitName && tables.bits[scene.bitName];
     this.bars = bars;
     this.hole = bit ? bit.diameter : base.hole;
     this.buttons = bit ? Math.min(Math.max(3, Math.round(bit.buttons / 3)), 7) : 5;
@@ -36,11 +38,11 @@ export class Drawing {
     Object.assign(this, fitted(this.canvas));
     this.font = parseFloat(getComputedStyle(document.documentElement).fontSize) * 0.78;
     this.ink = Object.fromEntries(["ink", "soft", "stone", "stone-dark", "steel", "paper", "accent", "contact", "line"].map(name => [name, colour(name)]));
-    const room = this.stroke + this.lengths[0] + this.lengths[1];
+    const room = this.stroke + this.lengths.reduce((sum, one) => sum + one);
     this.floor = this.height - Math.max(0.16 * this.height, 6 * this.font); // where the hole's bottom is at first
     this.k = (this.floor - 2.6 * this.font) / room; // pixels in a metre
     const widest = Math.max(this.hole, ...this.bars.flat().map(one => 2 * Math.sqrt(one[1] / Math.PI)));
-    this.r = Math.min(1.7 * this.k, 0.6 * this.width / widest);
+    this.r = Math.min(Math.max(1.7 * this.k, LEAST_WIDTH * this.width / widest), 0.6 * this.width / widest);
     this.middle = 0.46 * this.width;
   }
 
@@ -53,12 +55,16 @@ export class Drawing {
     const value = name => at(blow.time, blow.columns[name], t);
     const depth = at(blow.time, blow.depth, t) * MAGNIFIED * this.k;
     this.drawRock(pen, t);
-    const bitEnd = this.floor + depth, bitTop = bitEnd - this.lengths[1] * this.k;
-    const pistonEnd = bitTop - Math.max(value("gap"), 0) * this.k;
-    this.drawBar(pen, 1, bitTop, t);
+    const bitEnd = this.floor + depth;
+    let struck = bitEnd; // the topmost end of what is below the piston
+    for (let which = this.bars.length - 1; which > 0; which--) {
+      struck -= this.lengths[which] * this.k;
+      this.drawBar(pen, which, struck, t);
+    }
+    const pistonEnd = struck - Math.max(value("gap"), 0) * this.k;
     this.drawButtons(pen, bitEnd);
     this.drawBar(pen, 0, pistonEnd - this.lengths[0] * this.k, t);
-    if (value("contact_force") > 0) this.flash(pen, bitTop, value("contact_force") / (blow.greatest.contact_force || 1));
+    if (value("contact_force") > 0) this.flash(pen, struck, value("contact_force") / (blow.greatest.contact_force || 1));
     this.drawChips(pen, t);
     this.drawArrows(pen, pistonEnd - this.lengths[0] * this.k, value("drive_force"));
     this.drawScale(pen);
@@ -66,7 +72,7 @@ export class Drawing {
 
   // A bar in slices, each in the colour of its stress.
   drawBar(pen, which, top, t) {
-    const field = this.blow.fields[which], sections = this.bars[which];
+    const field = this.blow.fields.find(one => one.bar === which), sections = this.bars[which];
     let y = top, from = 0;
     for (const [length, area] of sections) {
       const half = Math.sqrt(area / Math.PI) * this.r, end = from + length;
@@ -198,13 +204,13 @@ export class Drawing {
     pen.globalAlpha = 0.85;
     pen.fillRect(0, y - 0.5 * this.font, this.width, this.height);
     pen.globalAlpha = 1;
-    for (let k = 0; k < 60; k++) {
+    for (let k = 0; k < 60 && this.blow.fields.length; k++) {
       pen.fillStyle = `rgb(${stressColour(k / 29.5 - 1)})`;
       pen.fillRect(left + k / 60 * wide, y, wide / 60 + 0.5, 0.7 * this.font);
     }
     pen.fillStyle = this.ink.ink;
     pen.textAlign = "left";
-    pen.fillText(`${WORDS.tension} ← ${short(most, 2)} ${unit} → ${WORDS.compression}`, left, y + 1.75 * this.font);
+    if (this.blow.fields.length) pen.fillText(`${WORDS.tension} ← ${short(most, 2)} ${unit} → ${WORDS.compression}`, left, y + 1.75 * this.font);
     pen.textAlign = "right";
     pen.fillText(fill(WORDS.magnified, { n: MAGNIFIED }), this.width - 0.5 * this.font, y + 0.6 * this.font);
   }

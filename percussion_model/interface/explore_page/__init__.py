@@ -1,1 +1,0 @@
-"""A page that runs the hammer in a browser: its sources, and how they become one file."""
