@@ -51,14 +51,14 @@ LEAST_ENERGY = 1e-30
 # A line is no shorter than this share of the reference penetration: where the bit turns, it is
 # the tangent.
 SHORTEST = 1e-6
-# Ratio of the ends of a line. The first goes from nothing to this share of the reference
-# penetration, or to where rock has this share of its stiffness there: on a softer line the bit
-# would swing about a place so far away that its motion had no digits left.
-RATIO, FIRST, SOFTEST = 1.02, 1e-3, 1e-4
+# So many lines reach the reference penetration, and grow with their distance from nothing; beyond,
+# their ends have one ratio. The first reaches where rock has this share of its stiffness at the
+# reference penetration: on a softer line the bit would swing about a place so far away that its
+# motion had no digits left.
+LINES, SOFTEST = 96, 1e-4
+RATIO = (1.0 + 1.0 / LINES) ** 2
 # A penetration so close below the end of a line is there, as a share of it.
 CLOSE = 1e-9
-# More lines than this reach beyond what any blow does.
-MOST_LINES = 1000
 
 
 @inlined
@@ -545,12 +545,19 @@ def crushed_on_line(par, s, line, one, other):
 
 
 @kernel
-def first_end(par):
-    """Penetration at which the first line ends [m]."""
-    share = FIRST
-    if par.exponent > 1.0:
-        share = max(FIRST, exp(math.log(SOFTEST) / (par.exponent - 1.0)))
-    return share * par.reference_penetration
+def next_end(par, part):
+    """Where the line ends on which rock loads, by what of the penetration loads it [m].
+
+    The line does the work of the curve, so that a step of it is off by the fourth power of its
+    length alone, and little penetrations have little weight in that.
+    """
+    P = par.reference_penetration
+    if part < (1.0 - CLOSE) * P:
+        end = (math.floor(LINES * math.sqrt((1.0 + CLOSE) * part / P)) + 1.0) / LINES
+        softest = exp(math.log(SOFTEST) / (par.exponent - 1.0)) if par.exponent > 1.0 else 0.0
+        return max(end * end, softest) * P
+    line = math.floor(log(part / P) / math.log(RATIO) + 1.0 + CLOSE / math.log(RATIO))
+    return exp(line * math.log(RATIO)) * P
 
 
 @kernel
@@ -573,11 +580,8 @@ def take_line(par, s):
         s.line_stiffness, s.line_origin = s.reload_stiffness, s.reload_from
         s.line_end = s.reload_to
         return
-    part, first, line = loading_part(par, s, a), first_end(par), 0
-    if part > (1.0 - CLOSE) * first:
-        place = log(part / first) / math.log(RATIO)
-        line = min(int(place + 1.0 + CLOSE / math.log(RATIO)), MOST_LINES)
-    way = first * exp(line * math.log(RATIO)) - part
+    part = loading_part(par, s, a)
+    way = next_end(par, part) - part
     b = min(a + (way / CHIPPING_SLOPE if is_chipping(par, s, a) else way), kink)
     s.line_stiffness, s.line_origin = line_between(par, s, place_at(par, s, a), place_at(par, s, b))
-    s.line_end = b if line < MOST_LINES else math.inf
+    s.line_end = b
