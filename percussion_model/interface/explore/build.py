@@ -168,7 +168,10 @@ def _hammers() -> Iterator[tuple[str, str, Scene]]:
     """Presets of the table with their titles."""
     yield "reference", "Reference, 3¼ inch", Scene()
     for scene, name in sorted(((hammer(name), name) for name in hammers()), key=_is_string):
-        title = scene.title.partition(",")[0].replace("Down-the-hole hammer of ", "Down the hole, ")
+        title, _, rods = scene.title.replace("Down-the-hole hammer of", "Down the hole,").partition(
+            ", " if scene.effects.string else "\n"
+        )
+        title += f", {rods.split()[0]}" if rods else ""
         yield name, title, scene
         if name in CHAMBERS:
             drive, what = ("pneumatic", "air") if name in AIR else ("hydraulic", "oil")

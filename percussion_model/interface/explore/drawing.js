@@ -181,8 +181,9 @@ export class Drawing {
     const most = 1.2 * Math.max(...this.blow.columns.drive_force.map(Math.abs)) || 1, x = 0.86 * this.width;
     pen.fillStyle = pen.strokeStyle = this.ink.accent;
     pen.textAlign = "center";
-    this.arrow(pen, x, pistonTop + 0.5 * this.lengths[0] * this.k, force / most * 4.5 * this.font);
-    pen.fillText(WORDS.drive, x, pistonTop + 0.5 * this.lengths[0] * this.k - (force > 0 ? 0.6 : -1.2) * this.font);
+    const y = Math.max(pistonTop + 0.5 * this.lengths[0] * this.k, 5.5 * this.font);
+    this.arrow(pen, x, y, force / most * 4.5 * this.font);
+    pen.fillText(WORDS.drive, x, y - (force > 0 ? 0.6 : -1.2) * this.font);
   }
 
   arrow(pen, x, y, long) {

@@ -1,6 +1,7 @@
 // Plots of one blow, and of the rate over feed and rotation.
 import { Plot, colour } from "./plot.js";
 import { short, unitOf } from "./numbers.js";
+import { WORDS } from "./words.js";
 
 // Index of the last time that is not after t.
 export function before(times, t) {
@@ -33,6 +34,7 @@ export class Figures {
   constructor(scrub, choose) {
     const canvas = id => document.getElementById(id);
     this.waves = new Plot(canvas("waves"), ms => scrub(1e-3 * ms));
+    this.waves.halo = true;
     this.forces = new Plot(canvas("forces"), ms => scrub(1e-3 * ms));
     this.path = new Plot(canvas("path"));
     this.energy = new Plot(canvas("energy"), ms => scrub(1e-3 * ms));
@@ -100,14 +102,15 @@ export class Figures {
     top = 0;
     for (const field of blow.fields.slice(0, -1)) {
       top += factor * field.edges.at(-1);
-      this.waves.line([[x[0], top], [x[1], top]], "ink", 1);
+      this.waves.line([[x[0], top], [x[1], top]], "halo", 3);
+      this.waves.line([[x[0], top], [x[1], top]], "on-halo", 1);
     }
   }
 
   // Energies over time, one on the other.
   drawEnergy(blow, x) {
     const [unit, factor] = unitOf("energy", this.imperial), most = Math.max(...blow.energies.at(-1).sum) || 1;
-    this.energy.begin(x, [0, 1.3 * factor * most], "time, ms", `energy, ${unit}`);
+    this.energy.begin(x, [0, 1.08 * factor * most], "time, ms", `energy, ${unit}`);
     const pen = this.energy.pen, place = this.energy;
     pen.save();
     pen.beginPath();
@@ -122,15 +125,7 @@ export class Figures {
       pen.fill();
     }
     pen.restore();
-    let left = place.left + 0.4 * place.font;
-    pen.textBaseline = "middle";
-    for (const one of blow.energies) {
-      pen.fillStyle = colour(one.colour);
-      pen.fillRect(left, place.top + 0.35 * place.font, 0.8 * place.font, 0.8 * place.font);
-      pen.fillStyle = colour("ink");
-      pen.fillText(one.name, left + 1.1 * place.font, place.top + 0.8 * place.font);
-      left += 1.8 * place.font + pen.measureText(one.name).width;
-    }
+    document.getElementById("energies").innerHTML = blow.energies.map(one => `<span class="key ${one.key}">${one.name}</span>`).join(" ");
   }
 
   // A cursor through all plots.
@@ -146,9 +141,10 @@ export class Figures {
   drawRates(plot, curve, now, kind, name, imperial) {
     const [unit, factor] = unitOf(kind, imperial), [per, rate] = unitOf("rate", imperial);
     const known = curve.points.filter(([, y]) => Number.isFinite(y));
-    const most = rate * Math.max(...known.map(([, y]) => y), now[1] || 0, 1e-9);
+    const most = rate * Math.max(...known.map(([, y]) => y), now[1] || 0) || 1;
     plot.ink = undefined;
     plot.begin([factor * curve.low, factor * curve.high], [0, 1.12 * most], `${name}, ${unit}`, `rate, ${per}`);
+    if (!known.length) plot.pen.fillText(WORDS.computing, plot.left + plot.font, plot.top + 2 * plot.font);
     plot.line(known.map(([x, y]) => [factor * x, rate * y]), "third", 1.8);
     plot.frame(factor * now[0], Number.isFinite(now[1]) ? rate * now[1] : 0);
     plot.canvas.setAttribute("aria-label", `${name}: ${known.map(([x, y]) => `${short(factor * x, 3)} ${unit} ${short(rate * y, 3)} ${per}`).join(", ")}`);
@@ -168,14 +164,16 @@ export function prepared(blow, scene) {
     return work;
   });
   const strain = Float64Array.from(time, t => blow.fields.reduce((sum, one) => sum + strainEnergy(one, bars[one.bar], t), 0));
+  const rods = blow.fields.filter(one => one.bar > 0 && one.bar < bars.length - 1);
+  const moving = Float64Array.from(time, t => rods.reduce((sum, one) => sum + one.kinetic[before(one.time, t)], 0));
   const parts = [
-    ["rock", "grey", rock], ["strain", "contact", strain], ["bit", "third", columns.bit_kinetic_energy],
-    ["piston", "rock", columns.piston_velocity.map(v => 0.5 * piston * v * v)],
+    ["rock", "grey", "grey", rock], ["strain", "contact", "contact", strain], ...(rods.length ? [["rods", "moving", "moving", moving]] : []),
+    ["bit", "third", "third", columns.bit_kinetic_energy], ["piston", "rock", "", columns.piston_velocity.map(v => 0.5 * piston * v * v)],
   ];
   let sum = new Float64Array(time.length);
-  const energies = parts.map(([name, colourName, values]) => {
+  const energies = parts.map(([name, colourName, key, values]) => {
     sum = sum.map((one, k) => one + Math.max(values[k], 0));
-    return { name, colour: colourName, values, sum };
+    return { name, colour: colourName, key, values, sum };
   });
   return { ...blow, greatest, depth, energies };
 }

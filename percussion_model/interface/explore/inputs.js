@@ -45,7 +45,7 @@ export class Inputs {
     const all = Object.entries(hammers).sort(([one], [other]) => (other === OWN) - (one === OWN));
     cards(this.boxes[0], "hammer", all.map(([name, one]) =>
       ({ name, title: one.title, picture: hammerPicture(scene.tables.presets[name], one) })),
-      scene.hammer, name => change({ hammer: name, bit: hammers[name].bits.includes(scene.bit) ? scene.bit : scene.tables.presets[name].bit_name, values: {} }));
+      scene.hammer, name => change({ hammer: name, bit: this.bitOf(name), values: {} }));
     const free = ownBit ? [] : [{ name: "", title: WORDS.given, picture: bitPicture({ diameter: base.hole, buttons: 9, gauge: 6 }) }];
     cards(this.boxes[1], "bit", [...free, ...base.bits.map(name => ({ name, title: bits[name].short, picture: bitPicture(bits[name]) }))],
       scene.bitName, name => change({ bit: name, values: this.without(["breaking.", "rotation."]) }));
@@ -62,6 +62,13 @@ export class Inputs {
   // Changed values less those of a group.
   without(groups) {
     return Object.fromEntries(Object.entries(this.get().values).filter(([key]) => !groups.some(group => key.startsWith(group))));
+  }
+
+  // Bit for another hammer: its own, or the one that was chosen, where it fits.
+  bitOf(name) {
+    const { preset, bit, tables } = this.get(), own = tables.presets[name].bit_name;
+    const isChosen = bit && bit !== preset.bit_name && tables.hammers[name].bits.includes(bit);
+    return isChosen || (!own && tables.hammers[name].bits.includes(bit)) ? bit : own;
   }
 
   set(key, value) {
@@ -103,7 +110,7 @@ class Entry {
     box.append(this.box);
     this.range.addEventListener("input", () => this.take(Number(this.range.value) / this.factor));
     this.field.addEventListener("change", () => {
-      const text = this.field.value.trim().replace(",", "."), value = text === "" ? NaN : Number(text);
+      const text = this.field.value.trim().replace(",", ".").replace(this.short, "").trim(), value = text === "" ? NaN : Number(text);
       this.take(value / this.factor, this.field.value);
     });
   }

@@ -2,11 +2,11 @@
 import { Drawing } from "./drawing.js";
 import { Figures, prepared } from "./figures.js";
 import { Inputs, shorter } from "./inputs.js";
-import { unitOf } from "./numbers.js";
+import { short, unitOf } from "./numbers.js";
 import { Player } from "./player.js";
-import { showResult, numberTexts } from "./result.js";
+import { numberTexts, rateText, showResult } from "./result.js";
 import { Scene } from "./scene.js";
-import { LENGTHS, SLIDERS, WORDS, fill } from "./words.js";
+import { LENGTHS, OTHERS, SLIDERS, WORDS, fill } from "./words.js";
 
 const part = id => document.getElementById(id);
 const START = { hammer: "dth4", bit: "dth-115", rock: "kuru-granite" };
@@ -94,6 +94,7 @@ function ask() {
   for (const [key] of CURVES) state.curves[key] = emptyCurve(scene, key);
   state.asked += 1;
   part("result").classList.add("waiting");
+  fade(true); // until the next picture
   if (state.ready) send();
   clearTimeout(waiting);
   waiting = setTimeout(() => history.replaceState(null, "", `#${scene.link()}`), ADDRESS_WAITS);
@@ -128,21 +129,24 @@ function take(answer) {
   if (answer.broken) return fail(answer.broken);
   if (answer.id !== state.asked) return undefined;
   if (answer.what === "refusal") {
-    state.found = { refusal: answer.text };
-    state.shown = answer.id;
+    Object.assign(state, { found: { refusal: answer.text }, shown: answer.id, isOld: true });
+    drawBlow(true);
   } else if (answer.what === "rate") {
     const waits = intervalOf(state.scene);
     const rate = Math.abs(answer.found.rate) < LEAST_RATE ? 0 : answer.found.rate, undamped = !state.scene.get("effects.loss") || state.scene.get("loss.time") === 0;
-    state.found = { ...answer.found, rate, undamped, interval: waits ? WORDS.rockWaiting : state.scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing };
+    state.found = { ...answer.found, rate, undamped, rock: state.scene.get("effects.rock"), interval: waits ? fill(WORDS.rockWaiting, { done: 0, count: waits.samples.length }) : state.scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing };
     addVolume(state.found.means);
     Object.assign(state, { shown: answer.id, took: performance.now() - state.began });
     drawCurves();
   } else if (answer.what === "errors") {
     Object.assign(state.found, { same: answer.same, errors: addVolume(answer.errors) });
+  } else if (answer.what === "sampled") {
+    state.found.interval = fill(WORDS.rockWaiting, answer);
   } else if (answer.what === "interval") {
     state.found.interval = { rock: shorter(tables.rocks[state.scene.rock].title), ends: answer.ends };
   } else if (answer.what === "picture") {
-    state.blow = answer.picture && prepared(answer.picture, state.scene);
+    state.isOld = !answer.picture;
+    if (answer.picture) state.blow = prepared(answer.picture, state.scene);
     return drawBlow(true);
   } else if (answer.what === "point") {
     state.curves[answer.curve].points.push([answer.x, answer.rate]);
@@ -158,8 +162,18 @@ function range() {
   return whole ? [blow.time[0], blow.period] : [Math.max(blow.time[0], -0.05 * blow.busy), Math.min(blow.busy, blow.period)];
 }
 
+// Whether what shows a blow is faded, as that of another scene.
+function fade(isOld) {
+  part("watch").classList.toggle("old", isOld);
+  for (const id of ["waves", "forces", "path", "energy"]) part(id).parentNode.classList.toggle("old", isOld);
+}
+
 function drawBlow(keep) {
+  part("old-blow").hidden = !(state.isOld && state.blow);
+  part("old-blow").textContent = WORDS.oldBlow;
+  fade(Boolean(state.isOld));
   if (!state.blow) return;
+  part("waves").parentNode.hidden = !state.blow.fields.length;
   drawing.take(state.blow, state.scene, state.imperial, range());
   figures.draw(state.blow, state.pinned?.blow, range(), state.imperial);
   const { time, columns, greatest } = state.blow, first = !state.drawn;
@@ -179,7 +193,6 @@ function drawCurves(only) {
 
 // Words for those who do not see the pictures.
 function describe() {
-  part("waves").parentNode.hidden = !state.blow.fields.length;
   const { greatest, period } = state.blow, mega = (1e-6 * greatest.stress).toFixed(0), force = (1e-3 * greatest.bit_force).toFixed(0);
   part("drawing").setAttribute("aria-label", fill(WORDS.drawn, { mega, force }));
   for (const id of ["waves", "forces", "path", "energy"]) part(id).setAttribute("aria-label", fill(WORDS.plotted, { what: part(id).previousElementSibling.textContent, period: (1e3 * period).toFixed(1), force, mega }));
@@ -245,16 +258,30 @@ function setTheme(dark) {
   part("theme").setAttribute("aria-pressed", String(dark));
 }
 
+// What is pinned: its rate, names, and what the sliders say or was changed.
+function pinnedWords() {
+  const { scene, found, imperial } = state, shown = SLIDERS.filter(one => scene.matters(one.key));
+  const changed = [...OTHERS, ...LENGTHS].filter(one => one.key in scene.values && scene.matters(one.key));
+  const numbers = [...shown, ...changed].map(({ key, name, unit }) => {
+    const [word, factor] = unitOf(unit, imperial);
+    return `${name} ${short(factor * scene.get(key), 4)} ${word}`.trim();
+  });
+  const names = [scene.base.title, tables.bits[scene.bitName]?.short, tables.rocks[scene.rock]?.title];
+  return { rate: rateText(found, imperial).filter(Boolean).join(" ± "), name: [...names, ...numbers].filter(Boolean).join("; ") };
+}
+
 function pin() {
   state.pinned = state.pinned || !state.found || state.found.refusal ? null : { found: state.found, blow: state.blow, link: state.scene.link() };
   part("pin").setAttribute("aria-pressed", String(Boolean(state.pinned)));
   part("pin").textContent = state.pinned ? WORDS.unpin : WORDS.pin;
   part("pinned").hidden = !state.pinned;
-  part("pinned").textContent = state.pinned ? fill(WORDS.pinned, { name: [state.scene.base.title, tables.bits[state.scene.bitName]?.short, tables.rocks[state.scene.rock]?.title, ...Object.entries(state.scene.values).map(([key, value]) => `${key} = ${value}`)].filter(Boolean).join("; ") }) : "";
+  part("pinned").textContent = state.pinned ? fill(WORDS.pinned, pinnedWords()) : "";
   redraw();
 }
 
 function listen() {
+  part("share").addEventListener("click", event => { if (event.target.tagName === "BUTTON" && part("by-hand").hidden) part("share").open = false; });
+  part("share").addEventListener("keydown", event => { if (event.key === "Escape") part("share").open = false; });
   part("units").onclick = () => { state.imperial = !state.imperial; part("units").setAttribute("aria-pressed", String(state.imperial)); redraw(); };
   part("theme").onclick = () => { setTheme(document.documentElement.dataset.theme !== "dark"); redraw(); };
   part("pin").onclick = pin;

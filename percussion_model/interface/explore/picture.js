@@ -51,9 +51,10 @@ async function stresses(motion, scene, blow, times, busy, step, keep) {
   const chosen = times.filter(t => t >= next && (next = t + (t < blow.time + busy ? step : 0)) > -Infinity);
   const found = new Map();
   for (const t of chosen) {
-    for (const [bar, { place, force }] of Object.entries(motion.fields(t))) {
-      if (!found.has(bar)) found.set(bar, { ...numbered(scene, bar), ...cellsOf(sectionsOf(scene, bar), place), time: new Float64Array(chosen.length), stress: new Float32Array(chosen.length * place.length) });
-      const { areas, time, stress } = found.get(bar);
+    for (const [bar, { place, force, velocity }] of Object.entries(motion.fields(t))) {
+      if (!found.has(bar)) found.set(bar, { ...numbered(scene, bar), ...cellsOf(sectionsOf(scene, bar), place), time: new Float64Array(chosen.length), kinetic: new Float64Array(chosen.length), stress: new Float32Array(chosen.length * place.length) });
+      const { areas, masses, time, kinetic, stress } = found.get(bar);
+      kinetic[count] = velocity.reduce((sum, one, cell) => sum + 0.5 * masses[cell] * one * one, 0);
       time[count] = t - blow.time;
       stress.set(force.map((one, cell) => one / areas[cell]), count * place.length);
     }
@@ -73,14 +74,15 @@ function sectionsOf(scene, bar) {
   return bar.startsWith("rod ") ? scene.rods[bar.slice(4) - 1].sections : scene[bar];
 }
 
-// Ends of the cells of a bar by their middles, and their areas.
+// Ends of the cells of a bar by their middles, their areas and masses.
 function cellsOf(sections, middles) {
-  const edges = [0], areas = [];
+  const edges = [0], areas = [], masses = [];
   let end = 0, section = -1;
   for (const middle of middles) {
     while (middle > end && section < sections.length - 1) end += sections[++section][0];
     areas.push(sections[section][1]);
     edges.push(2 * middle - edges.at(-1));
+    masses.push(sections[section][1] * sections[section][3] * (edges.at(-1) - edges.at(-2)));
   }
-  return { edges: Float64Array.from(edges), areas };
+  return { edges: Float64Array.from(edges), areas, masses };
 }

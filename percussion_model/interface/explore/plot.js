@@ -65,7 +65,7 @@ export class Plot {
     pen.textBaseline = "middle";
     for (const t of ticks(...y, (this.bottom - this.top) / (2.6 * font))) {
       this.line([[x[0], t], [x[1], t]], "grid", 1);
-      pen.fillText(short(t), this.left - 0.4 * font, this.py(t));
+      if (this.py(t) > this.top + 0.5 * font) pen.fillText(short(t), this.left - 0.4 * font, this.py(t)); // the name is there
     }
     pen.textBaseline = "alphabetic";
     pen.fillText(xName, this.right, this.bottom + 2.4 * font);
@@ -99,6 +99,11 @@ export class Plot {
     if (x === undefined || x < this.x[0] || x > this.x[1]) return;
     pen.strokeStyle = pen.fillStyle = this.ink ??= colour("ink");
     if (y === undefined) {
+      if (this.halo) { // over a picture that is as light as it is dark
+        pen.fillStyle = "#fff";
+        pen.fillRect(this.px(x) - 2, this.top, 4, this.bottom - this.top);
+        pen.fillStyle = "#000";
+      }
       pen.fillRect(this.px(x) - 0.75, this.top, 1.5, this.bottom - this.top);
     } else {
       pen.beginPath();

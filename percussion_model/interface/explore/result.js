@@ -2,6 +2,9 @@
 import { inDigits, isUndecided, meanText, ratePair, unitOf } from "./numbers.js";
 import { NUMBERS, WORDS, fill } from "./words.js";
 
+// A smaller share or number is rounding.
+const NOTHING = 1e-11;
+
 const part = id => document.getElementById(id);
 
 // How the blows follow each other, in a sentence.
@@ -9,7 +12,7 @@ export function motionWords(found) {
   const { kind, order, counted } = found;
   const said = kind === "periodic" ? (order === 1 ? WORDS.kinds.once : fill(WORDS.kinds.cycle, { n: order }))
     : fill(WORDS.kinds[kind], { n: counted });
-  const more = (found.rate === 0 ? WORDS.nothing : "") + (found.undamped ? WORDS.undamped : "");
+  const more = (found.rate === 0 ? WORDS.nothing[found.rock] ?? WORDS.nothing.bilinear : "") + (found.undamped ? WORDS.undamped : "");
   return said + more + (found.same === true ? WORDS.sameMotion : found.same === false ? WORDS.otherMotion : "");
 }
 
@@ -30,9 +33,9 @@ export function numberTexts(found, imperial) {
   if (found.rate && !found.undamped) shown.push(["Rate", behind && !slow.startsWith(WORDS.undecided) ? `${slow.replace(/ \S+$/, "")} ± ${behind}` : slow]);
   for (const [key, name, kind] of NUMBERS) {
     const value = found.means?.[key];
-    if (!Number.isFinite(value) || (key === "specific_energy" && (found.undamped || found.rate === 0))) continue;
+    if (!Number.isFinite(value) || found.rock === "none" || (key === "specific_energy" && (found.undamped || found.rate === 0))) continue;
     const [unit, factor] = unitOf(kind, imperial);
-    shown.push([name, `${meanText(value, found.errors?.[key], factor)} ${unit}`]);
+    shown.push([name, `${meanText(Math.abs(value) < NOTHING ? 0 : value, found.errors?.[key], factor)} ${unit}`]);
   }
   return shown;
 }
@@ -44,23 +47,22 @@ export function showResult(found, pinned, imperial) {
   part("refusal").textContent = found.refusal ?? "";
   if (found.refusal) {
     part("rate").textContent = "–";
-    for (const id of ["numerical", "motion", "rock-error", "numbers"]) part(id).textContent = "";
+    for (const id of ["numerical", "range", "motion", "rock-error", "numbers"]) part(id).textContent = "";
     return;
   }
   const [rate, error] = rateText(found, imperial);
   part("rate").textContent = rate;
   part("numerical").textContent = !found.rate ? "" : found.undamped ? error : found.errors ? (error ? fill(WORDS.numerical, { error }) : found.errors.rate_of_penetration === undefined ? WORDS.errorUnknown : "") : WORDS.noError;
   part("motion").textContent = motionWords(found);
-  part("rock-error").textContent = rockWords(found, imperial);
+  [part("range").textContent, part("rock-error").textContent] = rockWords(found, imperial);
   const others = new Map(pinned ? numberTexts(pinned, imperial) : []);
   part("numbers").innerHTML = numberTexts(found, imperial).map(([name, text]) =>
     `<div><dt>${name}</dt><dd>${text}</dd>${others.has(name) ? `<dd class="pinned">${others.get(name)}</dd>` : ""}</div>`).join("");
 }
 
 function rockWords(found, imperial) {
-  if (!found.rate || found.undamped) return "";
-  if (typeof found.interval === "string") return found.interval;
-  if (!found.interval) return "";
+  if (!found.rate || found.undamped || !found.interval) return ["", ""];
+  if (typeof found.interval === "string") return ["", found.interval];
   const [unit, factor] = unitOf("rate", imperial), [low, high] = found.interval.ends.map(end => inDigits(factor * found.rate * end, 2));
-  return fill(WORDS.rockError, { low, high: `${high} ${unit}`, rock: found.interval.rock });
+  return [fill(WORDS.rockRange, { low, high: `${high} ${unit}` }), fill(WORDS.rockError, { rock: found.interval.rock })];
 }

@@ -10,6 +10,8 @@ class Overtaken extends Error {}
 let engine, newest = 0;
 // How often messages are heard [ms], and blows after which a rate so far is told.
 const TURN = 30, SOME = 16;
+// How often progress is told [ms].
+const TOLD = 300;
 // Runs of rigid bodies that tell how the rate changes with the rock [s].
 const DURATION = 2, SETTLE = 0.5;
 
@@ -118,8 +120,13 @@ async function interval(wish, start, tell, keep) {
     }
   };
   const own = rigid({}), found = [];
+  let told = performance.now();
   for (const sample of wish.interval.samples) {
     await keep();
+    if (performance.now() - told > TOLD) {
+      told = performance.now();
+      tell("sampled", { done: found.length, count: wish.interval.samples.length });
+    }
     found.push(rigid(sample) / own);
   }
   const known = found.filter(Number.isFinite).sort((a, b) => a - b);
