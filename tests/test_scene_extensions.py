@@ -116,6 +116,8 @@ SEAL = Component("seal", "seal", FRICTION.parameters, push)
         ({"inputs": ("force", "load")}, "inputs: load must be one of force"),
         ({"state": {"a": ("N", "F", "b")}}, "state: b must be one of force"),
         ({"of_blow": ("force",)}, "of_blow: force must be one of none"),
+        ({"parameters": {"a": (0.5, "mm", "F", 0.0, 1.0)}}, "a has the unit 'mm': must be -, or"),
+        ({"state": {"a": ("N*m", "F", 0.0)}}, "a has the unit 'N*m': must be -, or of m, s, kg,"),
     ],
 )
 def test_what_is_wrong_with_a_component_is_told(changes, told):
@@ -124,6 +126,45 @@ def test_what_is_wrong_with_a_component_is_told(changes, told):
         "seal": ("stored", "taken from the piston by seal")
     }
     assert SEAL._replace(**changes).fault.startswith(told)
+
+
+SPRING = """
+from percussion_model.components import Component
+from percussion_model.physics.kernel import inlined
+
+@inlined
+def push(par, s, h):
+    return par.spring_stiffness * s.spring_length
+
+stiffness = {"stiffness": (1.0, "N/m", "k", 0.0, 1e9)}
+state = {"length": ("m", "x", 0.0)}
+COMPONENT = Component("spring", "spring", stiffness, on_piston=push, state=state)
+"""
+FIND_SPRING = """
+import sys
+from percussion_model import components
+components.__path__.append(sys.argv[1])
+components.COMPONENTS += (components._component("spring"),)
+from percussion_model.physics import state
+"""
+
+
+@pytest.mark.parametrize(
+    ("slip", "told"),
+    [
+        (("s.spring_length", "s.spring_lenght"), "spring_lenght must be one of spring_length, "),
+        (("par.spring_stiff", "par.spring_stif"), "spring_stifness must be one of spring_length, "),
+        (("on_piston=", "on_pistn="), "Component() got an unexpected keyword argument 'on_pistn'"),
+        (("", ""), ""),
+    ],
+)
+def test_a_slip_in_the_file_of_a_component_is_told(tmp_path, slip, told):
+    (tmp_path / "spring.py").write_text(SPRING.replace(*slip))
+    command = [sys.executable, "-c", FIND_SPRING, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    last = done.stderr.splitlines()[-1] if told else done.stderr
+    assert told in last
+    assert last.startswith("ValueError: ") == ("spring.py" in last) == bool(told)
 
 
 @pytest.mark.parametrize("needs", [{"effects.rokc": ("none",)}, {"effects.rock": ("nothing",)}])

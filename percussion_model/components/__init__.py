@@ -8,7 +8,8 @@ columns that show it and entries of the ledger follow from the same definition
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
@@ -23,6 +24,11 @@ _ARGUMENTS = {
     **dict.fromkeys(("lasts", "slope", "loading"), 2),
     "next_blow": 7,
 }
+# Units are products of these, and quotients of such, as "N s/m^2", "m^3/s/Pa" or "J/(kg K)".
+UNITS = ("m", "s", "kg", "N", "J", "Pa", "W", "K", "Hz", "rad")
+_FACTOR = rf"(?:{'|'.join(UNITS)})(?:\^[2-9])?"
+_PRODUCT = rf"{_FACTOR}(?: {_FACTOR})*"
+_UNIT = re.compile(rf"-?|(?:1|{_PRODUCT})(?:(?:/{_FACTOR})*|/\({_PRODUCT}\))")
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -139,6 +145,16 @@ class Component(NamedTuple):
         return {**of_force, **self.entries}
 
     @property
+    def named(self) -> Iterator[tuple[str, str]]:
+        """Files of its kernels, and names in them that begin as its parameters and fields do."""
+        kernels = (getattr(self, port) for port in _ARGUMENTS)
+        for file in {one.__module__ for one in kernels if one is not None}:
+            around = vars(import_module(file))
+            for code in (one.__code__ for one in around.values() if hasattr(one, "__code__")):
+                names = (one for one in code.co_names if one.startswith(f"{self.name}_"))
+                yield from ((file, name) for name in names if name not in around)
+
+    @property
     def fault(self) -> str:
         """What is wrong with the definition; empty if nothing is."""
         for port, count in _ARGUMENTS.items():
@@ -161,6 +177,11 @@ class Component(NamedTuple):
             default, _, _, lower, upper = of
             if default is not None and not lower <= default <= upper:
                 return f"{name} is {default!r} by default: must be from {lower!r} to {upper!r}"
+        units = {name: of[1] for name, of in self.parameters.items()}
+        for name, unit in (units | {name: of[0] for name, of in self.state.items()}).items():
+            if not _UNIT.fullmatch(unit):
+                must = f"must be -, or of {', '.join(UNITS)}, as N s/m^2"
+                return f"{name} has the unit {unit!r}: {must}"
         starts = {start for *_, start in self.state.values() if isinstance(start, str)}
         for where, names, known in (
             ("state", starts, self.parameters),
@@ -174,8 +195,14 @@ class Component(NamedTuple):
 
 
 def _component(name: str) -> Component:
-    found = getattr(import_module(f"{__name__}.{name}"), "COMPONENT", None)
     file = f"{name}.py of percussion_model/components"
+    try:
+        found = getattr(import_module(f"{__name__}.{name}"), "COMPONENT", None)
+    except TypeError as error:
+        told = str(error).replace("Component.__new__", "Component")
+        if not told.startswith("Component()"):
+            raise
+        raise ValueError(f"{file}: {told}: it takes {', '.join(Component._fields)}") from None
     if not isinstance(found, Component):
         raise ValueError(f"{file}: it defines no COMPONENT")
     if fault := found.fault:

@@ -158,6 +158,19 @@ _BLOW = [  # the blow under way: what it began with, and what it has come to
 # What changes; every field is a word of eight bytes or a row of such.
 COMMON_STATE = [*_SWITCHES, *_INPUTS, *_MOTION, *_SUMS, *_BLOW]
 
+
+def _refuse_unknown_names() -> None:
+    """Raise `ValueError` for a misspelt parameter or field in a component's kernels."""
+    known = {str(one[0]) for one in (*COMMON_PARAMETERS, *COMMON_STATE)}
+    for one in COMPONENTS:
+        for file, name in one.named:
+            if name not in known:
+                must = ", ".join(sorted(own for own in known if own.startswith(f"{one.name}_")))
+                raise ValueError(f"{file.replace('.', '/')}.py: {name} must be one of {must}")
+
+
+_refuse_unknown_names()
+
 # What a state from outside may hold; kernels index arrays, count and loop by these numbers.
 # Numbers in SI stay below this, so that no product of a few of them overflows.
 LARGEST = 1e60

@@ -3,6 +3,7 @@
 import pytest
 
 from fmu_src import units
+from percussion_model.components import UNITS
 
 
 @pytest.mark.parametrize(
@@ -26,3 +27,8 @@ def test_a_unit_is_a_product_of_known_ones(unit, name, base, monkeypatch):
 def test_an_unknown_unit_is_named():
     with pytest.raises(ValueError, match="unit 'furlong/s': 'furlong' must be one of 1, m, "):
         units.fmi_unit("furlong/s")
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_units_of_components_are_known(unit):
+    assert units.fmi_unit(unit) == unit
