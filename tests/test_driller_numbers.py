@@ -262,6 +262,10 @@ def test_hammers_on_air_are_told_to_be_starved_or_to_have_stalled():
     weak = simulate(scene.replace(**{"pneumatic.back_pressure": 10e5}), 1.0)
     assert weak.rate_of_penetration == 0.0
     assert any(text.startswith("no rock breaks: no blow") for text in weak.warnings)
+    still = simulate(scene.replace(**{"pneumatic.back_pressure": 15e5}), 0.5)
+    for found, has_reason in ((weak, True), (still, True), (stalled, False)):
+        told = [one for one in found.warnings if one.startswith("pneumatic.back_pressure = 1")]
+        assert len(told) == has_reason
 
 
 def test_a_pump_that_gives_all_it_can_is_told():

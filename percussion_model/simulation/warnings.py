@@ -40,6 +40,8 @@ STANDING = 1e-2
 # A supply below this share of what it is set to is starved, and one that gives more than it gets,
 # but for what a few blows differ by.
 STARVED, EVEN = 0.95, 1.02
+# A back pressure of so much of the supply leaves blows less than half of their energy.
+LEAST_BACK = 0.25
 # Ports of chambers of air, by their edges from the bit up (Bo et al. 2021, table 1).
 PORTS = ("upper_exhaust", "lower_intake", "upper_intake", "lower_exhaust")
 # A rear chamber of oil is below the pressure around it for about 3 % of the time, as measured; an
@@ -152,9 +154,8 @@ def _about_blows(result: Result) -> Iterator[str]:
     if result.scene.piston.model == "absent":
         yield "there is no piston, so there are no blows: the rate of penetration is undefined"
     elif len(result.blows) == 0:
-        stalled = result.scene.effects.drive in PRESSURES and result.duration > SLOWEST
         yield (
-            "the hammer has stalled: " * stalled
+            "the hammer has stalled: " * _is_still(result)
             + "no whole blow in this run: the rate of penetration is undefined"
         )
     elif result.has_stalled:
@@ -185,6 +186,12 @@ def _about_blows(result: Result) -> Iterator[str]:
         )
 
 
+def _is_still(result: Result) -> bool:
+    """Whether chambers move a piston to no blow at all."""
+    is_long = result.duration > SLOWEST and result.scene.effects.drive in PRESSURES
+    return is_long and len(result.blows) == 0
+
+
 def _is_starved(result: Result) -> bool:
     """Whether a compressor gives less air than the hammer takes."""
     scene, blows = result.scene, result.counted
@@ -211,10 +218,14 @@ def _about_supply(result: Result) -> Iterator[str]:
     ports = (f"pneumatic.{port}" for port in (*PORTS, "flushing"))
     if missing := [port for port in ports if scene[port] == 0.0]:
         yield f"ports are missing ({', '.join(missing)} = 0 m^2): chambers live on leaks"
-    if (back := scene["pneumatic.back_pressure"]) >= set_to > 0.0:
+    back = scene["pneumatic.back_pressure"]
+    too_weak = result.has_stalled or _is_still(result) or result.rate_of_penetration == 0.0
+    if back >= set_to > 0.0 or (too_weak and back > LEAST_BACK * set_to):
         yield (
-            f"pneumatic.back_pressure = {in_digits(back / 1e5)} bar is no less than the supply's "
-            f"{in_digits(set_to / 1e5)} bar (pneumatic.supply_pressure): nothing drives the piston"
+            f"pneumatic.back_pressure = {in_digits(back / 1e5)} bar "
+            + ("is no less than" if back >= set_to else "takes too much of")
+            + f" the supply's {in_digits(set_to / 1e5)} bar (pneumatic.supply_pressure): "
+            + ("nothing drives the piston" if back >= set_to else "blows are too weak, or cease")
         )
     if most > 0.0 == volume:
         yield (
