@@ -11,8 +11,10 @@ import time
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from percussion_model.engine import library
+from percussion_model.engine.compiler import NoCompilerError
 from percussion_model.interface import progress
 from percussion_model.interface.cli import BAD_INPUT, INTERRUPTED, _guarded, app
 from percussion_model.interface.commands import common
@@ -474,3 +476,21 @@ def test_a_json_run_loads_no_pictures_and_no_pandas():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("files", "told"), [([], "is not there"), (["old"], "is of other sources")]
+)
+def test_without_a_compiler_the_page_says_what_its_engine_is(monkeypatch, tmp_path, files, told):
+    def refuse(*_):
+        raise NoCompilerError("no compiler")
+
+    build = "percussion_model.interface.explore.build"
+    monkeypatch.setattr(f"{build}.FOLDER", tmp_path)
+    monkeypatch.setattr(f"{build}.BROUGHT", tmp_path / "none")
+    monkeypatch.setattr("percussion_model.engine.wasm.engine_file", refuse)
+    for stamp in files:
+        (tmp_path / "table.json").write_text(json.dumps({"stamp": stamp}))
+    found = CliRunner().invoke(app, ["explore", "--no-browser"])
+    assert found.exit_code == 2
+    assert found.stderr.endswith(f"no page: the engine in {tmp_path} {told}: no compiler\n")

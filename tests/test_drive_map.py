@@ -142,6 +142,17 @@ def test_a_hammer_on_another_rock_is_told_to_have_the_law_of_its_usual_one(tmp_p
         assert ("percussion drive-map" in done.stderr) == told
 
 
+@pytest.mark.parametrize("pressure", ["24 bar", "60 bar"])
+def test_oil_below_the_precharge_is_told_of_where_a_scene_is_made(tmp_path, pressure):
+    file = tmp_path / "t38.toml"
+    words = ["--hammer", "t38", "--rods", "1", "--pressure", pressure]
+    told = " ".join(CliRunner().invoke(app, ["new", str(file), *words]).stderr.split())
+    warnings = simulate(Scene.from_toml(file), 0.5, error_estimate=False).warnings
+    wanted = [text for text in warnings if "must be 59.0 bar at least" in text]
+    assert len(wanted) == (pressure == "24 bar") == bool(told)
+    assert all(told.endswith(text.partition(": ")[2]) for text in wanted)
+
+
 @pytest.mark.parametrize("pressure", [-1e5, 3e7])
 def test_a_pressure_out_of_bounds_is_refused_by_its_name(pressure):
     with pytest.raises(SceneError, match=r"pneumatic.supply_pressure = "):

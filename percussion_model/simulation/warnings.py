@@ -14,6 +14,7 @@ from percussion_model.scene.parameters import row_of
 from percussion_model.scene.rocks import read_rock
 from percussion_model.scene.rocks.breaking import rock_of
 from percussion_model.scene.scales import barrier_shares
+from percussion_model.scene.scene import Scene
 from percussion_model.simulation.means import by_volume, numbers_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS
 from percussion_model.simulation.result import Result, end_of, flight_acceleration
@@ -47,6 +48,7 @@ PORTS = ("upper_exhaust", "lower_intake", "upper_intake", "lower_exhaust")
 # A rear chamber of oil is below the pressure around it for about 3 % of the time, as measured; an
 # accumulator is never empty.
 MOST_VOID, MOST_EMPTY = 0.1, 0.01
+BELOW_PRECHARGE = "the line is below its precharge (hydraulic.precharge)"
 # Oil at a mean pressure below this share of what its pump may have is too little: valves let some
 # out, and lines swing.
 FED = 0.6
@@ -269,14 +271,21 @@ def _about_oil(result: Result) -> Iterator[str]:
             "oil: forces are held too long (hydraulic.step; or bodies that are rigid)"
         )
     if empty > MOST_EMPTY:
-        least = scene["hydraulic.precharge"] - REFERENCE
         yield (
-            f"the accumulator is empty for {in_digits(100.0 * empty, 2)} % of the time: the line "
-            "is below its precharge (hydraulic.precharge)"
-            + ", where blows are irregular or none: hydraulic.supply_pressure = "
-            f"{in_digits(set_to / 1e5)} bar must be {in_digits(least / 1e5)} bar at least"
-            * (set_to < least)
+            f"the accumulator is empty for {in_digits(100.0 * empty, 2)} % of the time: "
+            + (precharge_note(scene) or BELOW_PRECHARGE)
         )
+
+
+def precharge_note(scene: Scene) -> str:
+    """Say that oil has less pressure than its accumulator needs; nothing where it has enough."""
+    set_to, least = scene["hydraulic.supply_pressure"], scene["hydraulic.precharge"] - REFERENCE
+    if scene.effects.drive != "hydraulic" or set_to >= least:
+        return ""
+    return (
+        f"{BELOW_PRECHARGE}, where blows are irregular or none: hydraulic.supply_pressure = "
+        f"{in_digits(set_to / 1e5)} bar must be {in_digits(least / 1e5)} bar at least"
+    )
 
 
 def _has_jammed(result: Result) -> bool:

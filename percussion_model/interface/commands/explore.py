@@ -34,7 +34,7 @@ def explore(
 ) -> None:
     """Open a page on which rate, waves and forces of one blow follow sliders."""
     from percussion_model.engine.compiler import NoCompilerError
-    from percussion_model.interface.explore.build import page_file, with_scene
+    from percussion_model.interface.explore.build import FOLDER, page_file, with_scene
     from percussion_model.interface.progress import lines
     from percussion_model.scene.writing import write_whole
 
@@ -47,7 +47,9 @@ def explore(
         with lines("compiling for browsers") as report:
             file = page_file(report)
     except NoCompilerError as error:
-        raise common.refusal(f"no page: {error}") from None
+        is_old = (FOLDER / "table.json").is_file()
+        what = "is of other sources" * is_old or "is not there"
+        raise common.refusal(f"no page: the engine in {FOLDER} {what}: {error}") from None
     if own is not None or out is not None:
         text = file.read_text("utf-8")
         # a browser reads it after this command has ended

@@ -261,6 +261,7 @@ def new(
     from percussion_model.scene.parameters import read_number
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.units import has_unit
+    from percussion_model.simulation.warnings import precharge_note
 
     common.refuse_existing(file, force)
     common.check_file("FILE", file)
@@ -290,6 +291,8 @@ def new(
                 "drive.force and drive.reversal_distance, for effects.drive = pressure, are those "
                 "of the hammer's usual rock: `percussion drive-map` tells those of this one",
             )
+    if told := precharge_note(scene):
+        common.print_message(f"warning: the accumulator will be empty: {told}")
     scene.to_toml(file, comments=True)
     typer.echo(f"wrote {file}")
 
