@@ -25,6 +25,7 @@ from percussion_model.interface.terminal import show_settled
 from percussion_model.physics import settling
 from percussion_model.physics.records import BLOW
 from percussion_model.physics.settling import COMPARED
+from percussion_model.scene.hammers import with_chambers
 from percussion_model.simulation.rate import rate_of_blows
 from percussion_model.solvers.base import Solver, make_solver
 
@@ -228,6 +229,15 @@ def test_a_drill_that_stops_is_said_to_have_stalled():
     assert found.kind == "stalled"
     assert math.isnan(found.rate_of_penetration)
     assert found.summary()["rate_of_penetration"] is None
+
+
+def test_where_no_rock_breaks_the_rate_is_zero_and_the_period_has_its_error():
+    """Not the rounding of the depth, 3e-14 mm/s."""
+    weak = with_chambers("dth5", 24e5).replace(**{"pneumatic.back_pressure": 10e5})
+    found = settled(weak, error_estimate=True)
+    assert found.order
+    assert found.rate_of_penetration == found.rate_of_penetration_error == 0.0
+    assert found.blow_period_error > 0.0
 
 
 def test_senseless_requests_are_refused():

@@ -21,7 +21,7 @@ from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.error_estimate import FIRST_ORDER, with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
-from percussion_model.simulation.rate import rate_of_blows, ratio_of_sums
+from percussion_model.simulation.rate import advances, rate_of_blows, ratio_of_sums
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import Simulation, SimulationError
 from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_field
@@ -325,6 +325,8 @@ def settled(
 
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
         cycle, times = blows[len(blows) - order :], (simulation.time, simulation.wall_time)
+        if order and not advances(cycle).any():
+            rate = error = 0.0
         values = kind, order, rate, error, multiplier, cycle, blows, *times
         found = Settled(*values, scene.is_undamped, hole_diameter=scene.hole_diameter)
         if not error_estimate:
@@ -334,7 +336,7 @@ def settled(
         found.warnings.extend(warnings_of_motion(simulation.result(start)))
         others = _other_motions(simulation, tolerance, most_blows, scatter, most_time)
         found = replace(found, others=others)
-        if rate != 0.0 and math.isfinite(rate) and not scene.is_undamped:
+        if math.isfinite(rate) and not scene.is_undamped:
             settling = JUDGED_SHARE if order else SETTLING_SHARE
             found = replace(found, grid_errors=_grid_errors(simulation, settling))
         return found
