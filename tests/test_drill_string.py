@@ -11,6 +11,7 @@ from percussion_model import Scene, SceneError, SimulationError
 from percussion_model.analysis.drill_string import string_report
 from percussion_model.interface.plotting.drill_string import draw_string
 from percussion_model.interface.plotting.style import save_figures
+from percussion_model.interface.terminal import _cells_of_bars
 from percussion_model.scene.hammers import hammer
 
 AREA, E, RHO = 1.5e-3, 206e9, 7850.0
@@ -140,3 +141,10 @@ def test_figures_name_their_axes_and_units(shipped, tmp_path):
     files = save_figures(lambda: draw_string(shipped), tmp_path)
     assert len(files) == 6
     assert all(path.stat().st_size > 1000 for path in files)
+
+
+@pytest.mark.parametrize(("count", "names"), [(5, "shank, 4 rods"), (2, "shank, 1 rod")])
+def test_rods_are_counted_as_they_are_asked_for(count, names):
+    cells = {"piston": 16, **{f"rod {k + 1}": 12 for k in range(count)}, "bit": 4}
+    assert _cells_of_bars(cells, has_shank=True)[1] == f"piston, {names}, bit"
+    assert _cells_of_bars(cells, has_shank=False)[1] == f"piston, {count} rods, bit"

@@ -120,7 +120,10 @@ def show_summary(result: Result) -> None:
         table.add_row("Whole blows", f"{len(result.blows)}", after)
     table.add_row("Solver", result.solver, "")
     if result.cells:
-        table.add_row(counted(result.solver).capitalize(), *_cells_of_bars(result.cells))
+        rods = result.scene.string.rods
+        has_shank = len(rods) > 1 and rods[0].sections != rods[1].sections
+        cells = _cells_of_bars(result.cells, has_shank)
+        table.add_row(counted(result.solver).capitalize(), *cells)
     table.add_row("Prepared in", in_digits(result.setup_time, TIMED), "s")
     whose = "" if result.scene.solver.accuracy is None else ", all runs"
     table.add_row("Computed in", in_digits(result.wall_time, TIMED), f"s{whose}")
@@ -132,14 +135,15 @@ def show_summary(result: Result) -> None:
     show_warnings(result.warnings)
 
 
-def _cells_of_bars(cells: Mapping[str, int]) -> tuple[str, str]:
+def _cells_of_bars(cells: Mapping[str, int], has_shank: bool) -> tuple[str, str]:
     """Cells of each bar and the names of the bars, of those of a drill string in short."""
     runs = [(count, len(list(same))) for count, same in groupby(cells.values())]
     counts = " + ".join(f"{many} × {count}" if many > 2 else " + ".join([str(count)] * many)
                         for count, many in runs)  # fmt: skip
     names = list(cells)
     if len(names) > 3:
-        names[1:-1] = [f"{len(names) - 2} rods"]
+        count = len(names) - 2 - has_shank
+        names[1:-1] = ["shank"] * has_shank + [f"{count} rod{'s' * (count > 1)}"]
     return counts, ", ".join(names)
 
 
