@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from percussion_model import Scene, simulate
+from percussion_model.scene.hammers import with_chambers
 from percussion_model.simulation.error_estimate import (
     FEWEST_BLOWS,
     OF_VIBRATION,
@@ -228,3 +229,12 @@ def test_what_a_lasting_vibration_decides_has_no_error():
     assert mean_text(result.summary(), "standstill_bit_force", 1e-3).startswith("≈")
     calm = simulate(Scene(), 1.0, settle=0.3, record_events=False)
     assert set(OF_VIBRATION) <= set(calm.errors)
+
+
+def test_errors_of_a_rate_and_of_the_energy_of_its_advance_go_together():
+    """Energy by advance is power by rate; runs of few blows scatter by more than their barrier."""
+    result = simulate(with_chambers("hc25", 220e5), record_events=False)
+    names = ("rate_of_penetration", "percussive_power", "energy_per_advance")
+    errors = result.errors | {names[0]: result.rate_of_penetration_error}
+    rate, power, energy = (errors[name] / result.summary()[name] for name in names)
+    assert rate == pytest.approx(energy, abs=power)

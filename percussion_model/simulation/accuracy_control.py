@@ -86,7 +86,7 @@ class Step:
     @property
     def by_decisions(self) -> float:
         """What close decisions make of it."""
-        return error_by_decisions(self.run, self.run, self.decided)
+        return error_by_decisions(self.run, self.decided)
 
 
 def time_needed(result: Result, accuracy: float) -> float:

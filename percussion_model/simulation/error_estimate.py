@@ -214,20 +214,17 @@ def _by_slight_loss(numbers: Numbers, modes: int) -> float:
     return SLIGHT_LOSS / steps if steps > 0.0 else math.inf
 
 
-def error_by_decisions(part: GridRun, whole: GridRun, decided: Sequence[GridRun]) -> float:
+def error_by_decisions(part: GridRun, decided: Sequence[GridRun]) -> float:
     """Relative error that covers runs whose close decisions were taken otherwise.
 
     Parameters
     ----------
-    part, whole : GridRun
-        Over the time of those runs, and over all of it, which counts where the part is too short
-        to tell its blows of two kinds from it.
+    part : GridRun
+        Over the time of those runs, since scatter over a short one hides or feigns much.
     decided : sequence of GridRun
         On the same grid, with another barrier.
     """
-    settles = abs(whole.value - part.value) > CONFIDENCE * part.scatter
-    run = replace(whole, number=(part.value if settles else whole.value, whole.scatter))
-    off = (_difference(other, run) for other in decided if other.useful)
+    off = (_difference(other, part) for other in decided if other.useful)
     return SPREAD_MARGIN * max(off, default=0.0)
 
 
@@ -460,7 +457,7 @@ def _of_whole(
     scatter = scatter if math.isfinite(scatter) else math.inf
     by_grid = 0.0
     if whole.result.cells:
-        by_decisions = error_by_decisions(part, whole, decided)
+        by_decisions = error_by_decisions(part, decided)
         by_grid = max(estimate.grid, SPREAD_MARGIN * whole.apart, by_decisions)
     return Estimate(by_grid, scatter, estimate.floor)
 
@@ -489,7 +486,7 @@ def warnings_of_decisions(
     error: float,
 ) -> Iterator[str]:
     """Name the close decision that makes most of an error, relative, and the other rates."""
-    if error_by_decisions(part, whole, decided) < error:
+    if error_by_decisions(part, decided) < error:
         return
     blows = part.result.counted
     near = near_barrier(blows["barrier_margin"], _unsure_margin(part, others))
