@@ -246,7 +246,7 @@ def _finished(scene: Scene, runs: list[GridRun], step: Step | None) -> Result:
         setup_time=sum(run.result.setup_time for run in runs),
     )
     if known and error > wanted:
-        result.warnings.extend(warnings_of_decisions(judged, judged, before, decided, error))
+        result.warnings.extend(warnings_of_decisions(judged, before, decided, error))
     if not error <= wanted and not last.cut_short:
         result.warnings.append(_missed(result, step, wanted, error))
     elif step is not None and step.interrupted:

@@ -220,7 +220,7 @@ def error_by_decisions(part: GridRun, decided: Sequence[GridRun]) -> float:
     Parameters
     ----------
     part : GridRun
-        Over the time of those runs, since scatter over a short one hides or feigns much.
+        The run over their time: chance has the same part in both.
     decided : sequence of GridRun
         On the same grid, with another barrier.
     """
@@ -473,17 +473,13 @@ def _judged(
     if not math.isfinite(estimate.total):
         return result
     if estimate.total > LARGE_ERROR:
-        close = list(warnings_of_decisions(part, whole, others, decided, estimate.total))
+        close = list(warnings_of_decisions(part, others, decided, estimate.total))
         result.warnings.extend(close or _large_error(estimate, result.solver))
     return replace(result, rate_of_penetration_relative_error=estimate.total)
 
 
 def warnings_of_decisions(
-    part: GridRun,
-    whole: GridRun,
-    others: Sequence[GridRun],
-    decided: Sequence[GridRun],
-    error: float,
+    part: GridRun, others: Sequence[GridRun], decided: Sequence[GridRun], error: float
 ) -> Iterator[str]:
     """Name the close decision that makes most of an error, relative, and the other rates."""
     if error_by_decisions(part, decided) < error:
