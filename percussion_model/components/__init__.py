@@ -85,6 +85,8 @@ class Component(NamedTuple):
     is_drive : bool
         It is a choice of `effects.drive`, by its name, and no switch; its works are the drive's,
         and it sets `s.armed` where the next closure of the gap begins a blow.
+    is_throttled : bool
+        A drive that has less where the casing lifts off: it asks `throttle` of physics/feed.py.
     lasts : kernel or None
         lasts(par, s) -> time above 0 for which its mean forces may be taken as constant [s].
         Without it modes make no leaps.
@@ -118,6 +120,7 @@ class Component(NamedTuple):
     usual: Mapping[str, tuple[float, float]] = _NOTHING
     stores: bool = False
     loading: Callable[..., tuple[float, float, float]] | None = None
+    is_throttled: bool = False
 
     @property
     def fields(self) -> tuple[str, ...]:

@@ -29,6 +29,7 @@ from percussion_model.physics.chambers import (
     started,
     straight_slope,
 )
+from percussion_model.physics.feed import throttle
 from percussion_model.physics.gas import AIR, RATIO
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 
@@ -93,7 +94,7 @@ def keep_gas(par, s, gas):
 @inlined
 def set_pressure(par, s):
     """Pressure at which the supply is held where it can be [Pa]."""
-    return s.pneumatic_supply_pressure + par.pneumatic_ambient_pressure
+    return s.pneumatic_supply_pressure * throttle(par, s) + par.pneumatic_ambient_pressure
 
 
 @inlined
@@ -429,6 +430,7 @@ COMPONENT = Component(
     on_piston=on_piston,
     on_bit=on_bit,
     is_drive=True,
+    is_throttled=True,
     lasts=lasts,
     slope=slope,
     state={

@@ -2,16 +2,26 @@
 
 A casing rests on the shoulder of the bit and takes the reaction of the drive, whose mean over a
 blow the feed must balance (docs/model.md, eq. 3a). Where it does not, the casing lifts off until
-the drive has no more force than is held.
+the drive has no more force than is held: that of the pressure law is less, or the pressure of the
+supply, since air gets past.
 """
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 from percussion_model.physics.kernel import LEAST_DIVISOR, inlined
-from percussion_model.physics.records import DriveKind
 
 # A drive throttled further does not tell its recoil.
 LEAST_THROTTLE = 1e-2
+
+
+class Throttled(IntEnum):
+    """What a drive has less of where the casing lifts off."""
+
+    NOTHING = 0
+    FORCE = 1  # the pressure law
+    SUPPLY = 2  # a component that says so
 
 
 @inlined
@@ -23,15 +33,15 @@ def held(par, s):
 @inlined
 def full_recoil(par, s):
     """Mean force on the casing of a drive that is not throttled, up positive [N]."""
-    if par.drive == DriveKind.PRESSURE:
+    if par.throttled == Throttled.FORCE:
         return s.recoil_share * s.drive_force
     return s.recoil_share
 
 
 @inlined
 def throttle(par, s):
-    """Share of its force that the pressure law has: as much as lifts no casing further."""
-    if par.on_casing == 0:
+    """Share of its strength that a drive has: as much as lifts no casing further."""
+    if par.on_casing == 0 or par.throttled == Throttled.NOTHING:
         return 1.0
     recoil = full_recoil(par, s)
     return min(max(held(par, s), 0.0) / max(recoil, LEAST_DIVISOR), 1.0) if recoil > 0.0 else 1.0
@@ -48,9 +58,10 @@ def feed_on_bit(par, s):
 @inlined
 def note_recoil(par, s, push):
     """Take the recoil from the mean force of the drive over a blow [N]."""
-    if par.drive != DriveKind.PRESSURE:
+    if par.throttled == Throttled.NOTHING:
         s.recoil_share = max(push, 0.0)
     else:
-        full = throttle(par, s) * s.drive_force
-        if full > LEAST_THROTTLE * s.drive_force:
+        strength = s.drive_force if par.throttled == Throttled.FORCE else 1.0
+        full = throttle(par, s) * strength
+        if full > LEAST_THROTTLE * strength:
             s.recoil_share = max(push / max(full, LEAST_DIVISOR), 0.0)

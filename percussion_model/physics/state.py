@@ -37,6 +37,7 @@ COMMON_PARAMETERS = [
     ("removed_share", "f8"),  # of a crater of 1 mm
     ("removal_exponent", "f8"),
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
+    ("throttled", "i8"),  # a Throttled
     ("on_casing", "i8"),  # 1: feed acts on the casing
     ("casing_weight", "f8"),  # [N]
     ("hole_area", "f8"),  # [m2], 0 where it is not known

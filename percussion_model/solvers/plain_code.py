@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from percussion_model.components import COMPONENTS, Component
+from percussion_model.physics.feed import Throttled
 from percussion_model.physics.kernel import composed, when_compiling
 from percussion_model.scene import bars, contradictions, rock_law, solver_choice
 from percussion_model.solvers import setup
@@ -111,11 +112,14 @@ def _component(one: Component) -> Callable:
     present = f"with_{one.name}"
     pushes, moves = len(one.pushes) > 0, setup.follows_blows(one)
     steps, loads = pushes and one.lasts is None, one.loading is not None
+    is_throttled, supply = one.is_throttled, Throttled.SUPPLY.value
     numbers = _all([_number(name, name) for name in (f"{one.name}_{of}" for of in one.parameters)])
 
     @composed
     def fill(p: Any, values: Any) -> None:
         p[present] = 1
+        if is_throttled:
+            p["throttled"] = supply
         if pushes:
             p["effects"] = 1
         if steps:

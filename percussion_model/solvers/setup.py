@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.components import COMPONENTS, Component
+from percussion_model.physics.feed import Throttled
 from percussion_model.physics.records import DRIVES, DriveKind, Mode, Piston
 from percussion_model.scene.bars import bar_mass, bar_transit_time
 from percussion_model.scene.contradictions import ON_CASING
@@ -93,6 +94,7 @@ def fill_parameters(p: Any, numbers: Numbers, with_piston: bool) -> None:
     p["mass_p"] = bar_mass(numbers.piston)
     p["piston"] = PISTONS[values.piston_model]
     p["drive"] = DRIVES[values.effects_drive]
+    p["throttled"] = Throttled.FORCE if p["drive"] == DriveKind.PRESSURE else Throttled.NOTHING
     fill_rock(p, numbers)
     fill_loads(p, values)
     p["release"] = values.effects_standstill_tension == StandstillTension.RELEASE
@@ -133,6 +135,8 @@ def fill_components(p: Any, values: Any) -> None:
     for one in COMPONENTS:
         if all(getattr(values, field) in found for field, found in conditions_of(one).items()):
             p[f"with_{one.name}"] = 1
+            if one.is_throttled:
+                p["throttled"] = Throttled.SUPPLY
             if one.pushes:
                 p["effects"] = 1
                 if one.lasts is None:

@@ -9,9 +9,9 @@ import pytest
 
 from percussion_model import Scene, Simulation, simulate
 from percussion_model.components.rotation import next_blow as turn_on
-from percussion_model.physics.feed import feed_on_bit, note_recoil, throttle
+from percussion_model.physics.feed import Throttled, feed_on_bit, note_recoil, throttle
 from percussion_model.physics.place import kept_of, lift_bit, move_place
-from percussion_model.physics.records import Cuttings, DriveKind, Mode, RockKind
+from percussion_model.physics.records import Cuttings, Mode, RockKind
 from percussion_model.physics.rock import (
     close_interface,
     crush,
@@ -21,6 +21,7 @@ from percussion_model.physics.rock import (
     spring_force,
 )
 from percussion_model.scene.bits import bit
+from percussion_model.scene.hammers import with_chambers
 from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 
 K, GAMMA, AREA = 6e8, 4.0, 0.0154
@@ -482,7 +483,7 @@ def test_rows_of_a_run_have_the_torque_of_its_formula():
 
 
 def test_the_casing_passes_on_what_the_drive_leaves():
-    par, s = make(on_casing=1, casing_weight=600.0, drive=DriveKind.PRESSURE)
+    par, s = make(on_casing=1, casing_weight=600.0, throttled=Throttled.FORCE)
     s["feed"], s["drive_force"] = 11000.0, 12000.0
     assert feed_on_bit(par, s) == 11600.0  # before the first blow there is no recoil
     note_recoil(par, s, 8400.0)
@@ -505,3 +506,17 @@ def test_a_casing_of_no_recoil_is_a_feed_on_the_bit():
     push = scene.feed.force + 30.0 * scene.gravity.acceleration
     one, other = simulate(on, 0.05), simulate(scene.replace(**{"feed.force": push}), 0.05)
     assert one.end["hole_depth"] == pytest.approx(other.end["hole_depth"], rel=1e-12)
+
+
+@pytest.mark.parametrize("force", [1000.0, 3000.0])
+def test_air_has_less_pressure_where_the_casing_lifts_off(force):
+    """So much that the mean force of air on piston and bit is what holds the casing."""
+    scene = with_chambers("dth4", 24e5).computed_by("rigid", **{"feed.force": force})
+    simulation, impulses = Simulation(scene), []
+    for t in (2.0, 6.0):
+        impulses.append(simulation.sample(np.array([t]))["recoil_impulse"][0])
+    held = force + scene.feed.casing_mass * scene.gravity.acceleration
+    assert (impulses[1] - impulses[0]) / 4.0 == pytest.approx(held, rel=0.01)
+    lifted = Simulation(scene.replace(**{"feed.force": -1000.0}))
+    lifted.advance(1.0)
+    assert len(lifted.blows) <= 1  # the recoil is not known before one
