@@ -168,6 +168,15 @@ def lowest(typing, lanes):
     return types.float64(_lanes), generate
 
 
+def from_front(typing, index):
+    """The index as one without a sign."""
+
+    def generate(context, builder, signature, args):
+        return args[0]
+
+    return types.uintp(types.intp), generate
+
+
 def _lower(function, instruction):
     """Make an operator of lanes one instruction: a function of its own would stay a call."""
 

@@ -52,11 +52,16 @@ def lowest(lanes):
     return float(lanes.min())
 
 
+def from_front(index):
+    """An index that is never below zero: compiled, nothing looks whether it counts from the end."""
+    return index
+
+
 def _teach():
     from percussion_model.physics.compiling import instruct
     from percussion_model.solvers.modal import lane_types
 
-    for function in (load, store, spread, total, totals, lower_of, lowest):
+    for function in (load, store, spread, total, totals, lower_of, lowest, from_front):
         instruct(function, getattr(lane_types, function.__name__))
 
 

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from percussion_model.physics.kernel import inlined, kernel, preparing
-from percussion_model.solvers.modal.lanes import WIDTH, load, spread, total, totals
+from percussion_model.solvers.modal.lanes import (
+    WIDTH,
+    from_front,
+    load,
+    spread,
+    total,
+    totals,
+)
 from percussion_model.solvers.wave.records import Bar, Body, Place, Steel
 from percussion_model.solvers.wave.taps import width_of
 
@@ -25,9 +32,10 @@ VELOCITY_OF, STRESS_OF = 0, 1
 def turned(places, weights, rings, step, k, way):
     """By how much a step changes what a section of one to two steps keeps (`taps.turning`)."""
     weight, size = places[k, WEIGHTS], places[k, SIZE]
-    x = rings[0, places[k, RING] + 2 * size * way + ((step - places[k, DELAY]) & (size - 1))]
-    q = rings[0, places[k, RING] + 4 * size + way]
-    return weights[0, weight + 1] * x - weights[0, weight] * q - q
+    late = (step - places[k, DELAY]) & (size - 1)
+    x = rings[0, from_front(places[k, RING] + 2 * size * way + late)]
+    q = rings[0, from_front(places[k, RING] + 4 * size + way)]
+    return weights[0, from_front(weight + 1)] * x - weights[0, from_front(weight)] * q - q
 
 
 @inlined
@@ -35,13 +43,16 @@ def send(places, weights, rings, step, k, down, up, share):
     """Send both waves, less what body forces gave the bar, into a section at a step's end."""
     size = places[k, SIZE]
     if places[k, TAPS] == 1 and places[k, WEIGHTS] >= 0:
-        kept = places[k, RING] + 4 * size
-        for way in range(2):
-            rings[0, kept + way] += share * turned(places, weights, rings, step, k, way)
+        kept = from_front(places[k, RING] + 4 * size)
+        beside = from_front(places[k, RING] + 4 * size + 1)
+        one = turned(places, weights, rings, step, k, 0)
+        other = turned(places, weights, rings, step, k, 1)
+        rings[0, kept] += share * one
+        rings[0, beside] += share * other
     place = places[k, RING] + ((step + 1) & (size - 1))
     # twice, so that what is read never wraps
-    rings[0, place] = rings[0, place + size] = down
-    rings[0, place + 2 * size] = rings[0, place + 3 * size] = up
+    rings[0, from_front(place)] = rings[0, from_front(place + size)] = down
+    rings[0, from_front(place + 2 * size)] = rings[0, from_front(place + 3 * size)] = up
 
 
 @inlined
@@ -61,10 +72,12 @@ def pass_on(par, s, chain, waves):
         first = places[k, RING] + ((step - places[k, DELAY] - taps + 1) & (size - 1))
         second = first + 2 * size
         if taps == 1:
-            down, up = rings[0, first], rings[0, second]
+            down, up = rings[0, from_front(first)], rings[0, from_front(second)]
             if weight >= 0:  # of one to two steps (taps.turning)
-                a, b, kept = weights[0, weight], weights[0, weight + 1], places[k, RING] + 4 * size
-                down, up = a * down + b * rings[0, kept], a * up + b * rings[0, kept + 1]
+                a, b = weights[0, from_front(weight)], weights[0, from_front(weight + 1)]
+                kept = places[k, RING] + 4 * size
+                down = a * down + b * rings[0, from_front(kept)]
+                up = a * up + b * rings[0, from_front(kept + 1)]
         else:
             share = load(weights, 0, weight)
             x, y = load(rings, 0, first), load(rings, 0, second)
@@ -86,12 +99,13 @@ def pass_on(par, s, chain, waves):
                 other += by * both
         alpha = steel[k, ALPHA]
         if alpha == 0.0:
-            came[UP, k] = up + bars[GIVEN, places[k, BAR]]
+            came[UP, k] = up + bars[GIVEN, from_front(places[k, BAR])]
             if k > 0:
-                came[DOWN, k - 1] = before + bars[GIVEN, places[k - 1, BAR]]
+                above = from_front(k - 1)
+                came[DOWN, above] = before + bars[GIVEN, from_front(places[above, BAR])]
         else:
             v = alpha * before + steel[k, BETA] * up
-            came[UP_OUT, k - 1], came[DOWN_OUT, k] = v - before, v - up
+            came[UP_OUT, from_front(k - 1)], came[DOWN_OUT, k] = v - before, v - up
         before = down
     last = par.sections - 1
     came[DOWN, last] = before + bars[GIVEN, places[last, BAR]]

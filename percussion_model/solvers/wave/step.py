@@ -22,6 +22,7 @@ from percussion_model.physics.loads import (
 )
 from percussion_model.physics.records import Mode, Piston
 from percussion_model.physics.rock import barrier_level
+from percussion_model.solvers.modal.lanes import from_front
 from percussion_model.solvers.wave.joint import shoulders, yielding
 from percussion_model.solvers.wave.piston import mass_contact, move_piston
 from percussion_model.solvers.wave.records import MOST_CUTS, Bar, Fit, Has, Joint
@@ -142,9 +143,9 @@ def accelerations(par, s, chain, waves, push):
 
 
 @inlined
-def passed_to(old, new, tau, dt):
+def passed_to(old, new, share):
     """What changes from `old` to `new` in a step, after a part of it, as waves that are mixed."""
-    return new if tau == dt else old + tau / dt * (new - old)
+    return new if share == 1.0 else old + share * (new - old)
 
 
 @inlined
@@ -199,29 +200,30 @@ def holds(fits, joints, j, a, y):
 def meet_joints(par, s, chain, waves, tau):
     """All joints below rods."""
     came, fits, joints = waves.came, chain.fits, waves.joints
-    places, steel, half = chain.places, chain.steel, 0.5 * par.dt
+    steel, half, share, struck = chain.steel, 0.5 * par.dt, tau / par.dt, par.struck
+    lag, more = par.lag, 1.0 + par.viscous
     for j in range(par.joints):
-        k = int(fits[j, SECTION])
-        above, below = places[k - 1, BAR], places[k, BAR]
-        down, up = came[DOWN, k - 1], came[UP, k]
+        k, upper = from_front(int(fits[j, SECTION])), from_front(int(fits[j, SECTION]) - 1)
+        above, below = from_front(struck + j), from_front(struck + j + 1)
+        down, up = came[DOWN, upper], came[UP, k]
         v_a = 2.0 * down + half * came[ACCELERATION, above]
         v_b = 2.0 * up + half * came[ACCELERATION, below]
-        before = par.lag * joints[BY_WAVES, j]
-        a, y = v_a - v_b - fits[j, YIELD] * before, fits[j, YIELD] / (1.0 + par.viscous)
+        before = lag * joints[BY_WAVES, j]
+        a, y = v_a - v_b - fits[j, YIELD] * before, fits[j, YIELD] / more
         if holds(fits, joints, j, a, y):
-            force = a * fits[j, STIFF] * (1.0 + par.viscous)
+            force = a * fits[j, STIFF] * more
         else:
             force = give_way(s, fits, joints, j, a, y, tau) / tau
-        by_waves = before + force / (1.0 + par.viscous)
-        joints[BY_WAVES, j] = passed_to(joints[BY_WAVES, j], by_waves, tau, par.dt)
+        by_waves = before + force / more
+        joints[BY_WAVES, j] = passed_to(joints[BY_WAVES, j], by_waves, share)
         v_a, v_b = v_a - by_waves * fits[j, ABOVE], v_b + by_waves * fits[j, BELOW]
         s.e_loss += (force - by_waves) * (v_b - v_a) * tau
         returned, passed = v_a - down, v_b - up
-        came[UP_OUT, k - 1], came[DOWN_OUT, k] = returned, passed
+        came[UP_OUT, upper], came[DOWN_OUT, k] = returned, passed
         came[FROM_BELOW, above] = came[FROM_ABOVE, below] = by_waves * tau
         joints[FORCE, j] = force
         joints[LEAST, j] = min(joints[LEAST, j], force)
-        z_a, z_b = steel[k - 1, IMPEDANCE] * tau, steel[k, IMPEDANCE] * tau
+        z_a, z_b = steel[upper, IMPEDANCE] * tau, steel[k, IMPEDANCE] * tau
         joints[CAME, j] += z_a * down * down
         joints[PASSED, j] += z_b * passed * passed
         joints[RETURNED, j] += z_a * returned * returned
@@ -313,7 +315,7 @@ def meet_piston(par, s, chain, waves, push, tau, time, blows, events):
         d_t, q_t, impulse = mass_contact(v_p, v_v, par.mass_p, z_v, tau)
         s.e_numerical += z_v * (q_t - d_t * d_t / tau)
     by_waves = before + impulse / (more * tau)
-    s.g_contact = passed_to(s.g_contact, by_waves, tau, par.dt)
+    s.g_contact = passed_to(s.g_contact, by_waves, tau / par.dt)
     v_t += by_waves / z_t
     s.e_loss += (impulse - by_waves * tau) * v_t
     if elastic:
@@ -343,7 +345,7 @@ def meet_rock(par, s, chain, waves, tau, time, events):
     d, q = rock_step(par, s, energy, v_free, z_v, tau, time, events)
     impulse, up = z_v * (v_free * tau - d), d / tau - down
     by_waves = z * (v_whole - d / tau)
-    s.g_rock = passed_to(s.g_rock, by_waves, tau, par.dt)
+    s.g_rock = passed_to(s.g_rock, by_waves, tau / par.dt)
     s.e_loss += (by_waves - impulse / tau) * d
     waves.came[UP_OUT, k], waves.came[FROM_BELOW, bit] = up, by_waves * tau
     s.e_numerical += z_v * (q - d * d / tau)
@@ -367,19 +369,14 @@ def meet_nothing(par, s, chain, waves, tau):
 
 
 @inlined
-def velocity_by_loss(par, s, chain, waves, i):
+def velocity_by_loss(bodies, i, above, below):
     """Mean velocity of a bar below the piston by the impulses of loss at its ends [m/s].
 
     They are eta/2 of the forces by waves, or as much less as its sections spread waves less.
     Without them momentum that an end gives a bar would move its mean by v eta/2 less than its
     ends, what body forces give would not: with each blow ends and mean would drift apart.
     """
-    joints, j, above, below = waves.joints, i - par.struck, s.g_contact, s.g_rock
-    if j > 0:
-        above = joints[BY_WAVES, j - 1]
-    if i < par.bars - 1:
-        below = joints[BY_WAVES, j]
-    return chain.bodies[i, LATE] * (above - below) * chain.bodies[i, INV_MASS]
+    return bodies[i, LATE] * (above - below) * bodies[i, INV_MASS]
 
 
 @inlined
@@ -388,11 +385,16 @@ def move_bars(par, s, chain, waves, damper, tau, rest):
     came, bars, bodies, g = waves.came, waves.bars, chain.bodies, par.gravity
     struck, bit, held, lifted = par.struck, par.bars - 1, 0.0, 0.0
     path = 0.0
-    for i in range(struck, par.bars):
+    joints, last = waves.joints, par.bars - 1 - struck
+    g_contact, g_rock = s.g_contact, s.g_rock
+    for j in range(last + 1):
+        i = from_front(struck + j)
         v0, w0 = bars[VELOCITY, i], bars[BY_LOSS, i]
         gained = (came[FROM_ABOVE, i] - came[FROM_BELOW, i]) * bodies[i, INV_MASS]
         v1 = v0 + came[ACCELERATION, i] * tau + gained
-        w1 = velocity_by_loss(par, s, chain, waves, i)
+        above = g_contact if j == 0 else joints[BY_WAVES, from_front(j - 1)]
+        below = g_rock if j == last else joints[BY_WAVES, j]
+        w1 = velocity_by_loss(bodies, i, above, below)
         more = 0.5 * tau * (w0 + w1)
         path = 0.5 * (tau * (v0 + v1) + rest * (v1 - v0)) + more
         bars[VELOCITY, i], bars[BY_LOSS, i] = v1, w1
@@ -400,7 +402,7 @@ def move_bars(par, s, chain, waves, damper, tau, rest):
         # what its waves get of body forces, beside their work, loss has taken from the waves
         s.e_loss += bodies[i, MASS] * came[ACCELERATION, i] * more
         lifted += bodies[i, MASS] * path
-        if i == struck:
+        if j == 0:
             held = path
     s.e_gravity += g * lifted
     if par.effects == 1:
@@ -514,12 +516,13 @@ def step(par, s, chain, waves, tau, blows, events):
         chain.places, waves.rings, waves.came, chain.bodies, waves.bars
     )  # fmt: skip
     now, half, rewrite = s.step, 0.5 * par.dt, False
+    most = par.most_given
     for i in range(par.bars):
         given = bars[GIVEN, i] + half * came[ACCELERATION, i]
         bars[GIVEN, i] += share * half * came[ACCELERATION, i]
-        came[DOWN_OUT, int(bodies[i, FIRST])] -= given
-        came[UP_OUT, int(bodies[i, LAST])] -= given
-        rewrite = rewrite or abs(given) > par.most_given
+        came[DOWN_OUT, from_front(int(bodies[i, FIRST]))] -= given
+        came[UP_OUT, from_front(int(bodies[i, LAST]))] -= given
+        rewrite = rewrite | (abs(given) > most)
     if share < 1.0:
         for k in range(par.sections):
             change = half * came[ACCELERATION, places[k, BAR]]
