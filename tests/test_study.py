@@ -301,6 +301,22 @@ def test_workers_that_are_ended_within_a_message_hold_nobody_up(tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (0, "2000000\n", "")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="no masks of signals there")
+def test_no_worker_hears_ctrl_c(tmp_path):
+    """The bug: the first one did, where nothing before it had started what tracks resources."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import signal\n"
+        "from percussion_model.analysis.study.workers import on_this_machine\n"
+        "def work(number):\n"
+        "    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])\n"
+        "if __name__ == '__main__':\n"
+        "    print([deaf for _, deaf in on_this_machine(work, [(k,) for k in range(6)], 3)])\n"
+    )
+    words = [sys.executable, str(script)]
+    assert subprocess.check_output(words, text=True, timeout=60) == f"{[True] * 6}\n"
+
+
 def test_a_script_that_workers_run_again_is_told_so(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(

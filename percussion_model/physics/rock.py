@@ -553,7 +553,7 @@ def next_end(par, part):
     """
     P = par.reference_penetration
     if part < (1.0 - CLOSE) * P:
-        end = (math.floor(LINES * math.sqrt((1.0 + CLOSE) * part / P)) + 1.0) / LINES
+        end = (math.floor(LINES * math.sqrt((1.0 + CLOSE) * max(part, 0.0) / P)) + 1.0) / LINES
         softest = exp(math.log(SOFTEST) / (par.exponent - 1.0)) if par.exponent > 1.0 else 0.0
         return max(end * end, softest) * P
     line = math.floor(log(part / P) / math.log(RATIO) + 1.0 + CLOSE / math.log(RATIO))

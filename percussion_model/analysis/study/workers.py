@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing import current_process, get_context
+from multiprocessing import current_process, get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from threading import current_thread, main_thread
@@ -83,6 +83,8 @@ def _start(work: Callable[..., Any], count: int, workers: dict[Connection, BaseP
     if len(workers) >= count:
         return
     context = get_context("spawn")
+    if os.name != "nt":  # started by the first worker, it would let that one hear Ctrl-C
+        resource_tracker.ensure_running()
     with _one_thread_each(), _interrupts_left_to_this_process():
         while len(workers) < count:
             here, there = context.Pipe()
