@@ -94,7 +94,16 @@ def keep_gas(par, s, gas):
 @inlined
 def set_pressure(par, s):
     """Pressure at which the supply is held where it can be [Pa]."""
-    return s.pneumatic_supply_pressure * throttle(par, s) + par.pneumatic_ambient_pressure
+    return s.pneumatic_supply_pressure + par.pneumatic_ambient_pressure
+
+
+@inlined
+def at_hammer(par, s):
+    """Pressure that chambers fill from: less than the supply's where the casing lifts off [Pa]."""
+    share, ambient = throttle(par, s), par.pneumatic_ambient_pressure
+    if share == 1.0:
+        return s.pneumatic_supply
+    return ambient + share * (s.pneumatic_supply - ambient)
 
 
 @inlined
@@ -232,7 +241,7 @@ def settle(par, s):
     else:
         way = Way(True, before, bit - s.pneumatic_from_v, x, bit - v_p, h, 0.0)
         then = go(
-            par, s.pneumatic_supply, outside(par, s), started(present_gas(s), before, 0.0), way
+            par, at_hammer(par, s), outside(par, s), started(present_gas(s), before, 0.0), way
         )
     keep_gas(par, s, then.gas)
     done = then.done
@@ -273,7 +282,7 @@ def foretell(par, s, span):
     # a piston that touches the bit goes on as it has gone
     u, pull = s.v_b - s.v_p, s.pneumatic_pull if s.closed == 1 else 0.0
     way = Way(s.closed == 1, x, u, x + d * (u + 0.5 * pull * d), u + pull * d, d, fall)
-    then = go(par, s.pneumatic_supply, outside(par, s), y, way)
+    then = go(par, at_hammer(par, s), outside(par, s), y, way)
     s.pneumatic_span, s.pneumatic_since = span, 0.0
     s.pneumatic_then_mass_u, s.pneumatic_then_energy_u = then.gas.mass_u, then.gas.energy_u
     s.pneumatic_then_mass_l, s.pneumatic_then_energy_l = then.gas.mass_l, then.gas.energy_l

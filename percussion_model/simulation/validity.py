@@ -169,24 +169,24 @@ def jam_note(needed: float, stall: float) -> Iterator[str]:
         )
 
 
-def recoil_note(recoil: float, held: float, by_law: bool) -> Iterator[str]:
+def recoil_note(recoil: float, held: float, is_throttled: bool) -> Iterator[str]:
     """Say that the casing lifts off, where the recoil takes all that holds it [N].
 
     Parameters
     ----------
-    by_law : bool
-        Whether the drive is the pressure law, whose force the lifted casing lessens.
+    is_throttled : bool
+        Whether a casing that lifts lessens the drive (physics/feed.py).
     """
     if recoil * HELD > held:
         then = (
             "so the hammer lifts and has less than its full force"
-            if by_law
-            else "so a real hammer would lift and drill slower; this one, with chambers, does "
-            "not, and its rate is too high"
+            if is_throttled
+            else "so a real hammer would lift and drill slower; this one does not, and its rate is "
+            "too high"
         )
         yield (
             f"the feed does not hold the casing: the recoil takes all of the {1e-3 * held:.3g} kN "
-            f"that press on it, {then}; more feed.force holds it"
+            f"that feed and weight press on it, {then}; more feed.force holds it"
         )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from percussion_model.components import DRIVES
 from percussion_model.physics.oil import REFERENCE
 from percussion_model.physics.records import EventKind, Mode
 from percussion_model.scene.inputs import PRESSURES
@@ -41,6 +42,8 @@ STANDING = 1e-2
 # A supply below this share of what it is set to is starved, and one that gives more than it gets,
 # but for what a few blows differ by.
 STARVED, EVEN = 0.95, 1.02
+# Drives that have less where the casing lifts off.
+THROTTLED = ("pressure", *(one.name for one in DRIVES if one.is_throttled))
 # A back pressure of so much of the supply leaves blows less than half of their energy.
 LEAST_BACK = 0.25
 # Ports of chambers of air, by their edges from the bit up (Bo et al. 2021, table 1).
@@ -362,8 +365,7 @@ def _about_breaking(result: Result) -> Iterator[str]:
         held = scene.feed.force + scene.feed.casing_mass * gravity
         on_bit = (end["recoil_impulse"] - end["drive_impulse"]) / result.duration
         on_piston = float(blows["drive_impulse"].sum() / blows["period"].sum())
-        by_law = result.scene.effects.drive == "pressure"
-        yield from recoil_note(on_piston + on_bit, held, by_law)
+        yield from recoil_note(on_piston + on_bit, held, scene.effects.drive in THROTTLED)
     energy = by_volume(numbers_over(blows), scene.hole_diameter).get("specific_energy")
     if energy is not None and energy > 0.0 and (named := rock_of(scene, ("rock.",))):
         strength = read_rock(named).strength

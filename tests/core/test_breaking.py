@@ -508,10 +508,11 @@ def test_a_casing_of_no_recoil_is_a_feed_on_the_bit():
     assert one.end["hole_depth"] == pytest.approx(other.end["hole_depth"], rel=1e-12)
 
 
-@pytest.mark.parametrize("force", [1000.0, 3000.0])
-def test_air_has_less_pressure_where_the_casing_lifts_off(force):
+@pytest.mark.parametrize(("force", "flow"), [(1000.0, 0.0), (3000.0, 0.0), (3000.0, 10.0)])
+def test_air_has_less_pressure_where_the_casing_lifts_off(force, flow):
     """So much that the mean force of air on piston and bit is what holds the casing."""
-    scene = with_chambers("dth4", 24e5).computed_by("rigid", **{"feed.force": force})
+    changes = {"feed.force": force, "pneumatic.supply_flow": flow}
+    scene = with_chambers("dth4", 24e5).computed_by("rigid", **changes)
     simulation, impulses = Simulation(scene), []
     for t in (2.0, 6.0):
         impulses.append(simulation.sample(np.array([t]))["recoil_impulse"][0])

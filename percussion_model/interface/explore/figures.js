@@ -138,13 +138,14 @@ export class Figures {
   }
 
   // Rate over one setting, with a dot where the hammer is.
-  drawRates(plot, curve, now, kind, name, imperial) {
+  drawRates(plot, curve, pinned, now, kind, name, imperial) {
     const [unit, factor] = unitOf(kind, imperial), [per, rate] = unitOf("rate", imperial);
-    const known = curve.points.filter(([, y]) => Number.isFinite(y));
-    const most = rate * Math.max(...known.map(([, y]) => y), now[1] || 0) || 1;
+    const [known, other] = [curve, pinned].map(one => one?.points.filter(([, y]) => Number.isFinite(y)) ?? []);
+    const most = rate * Math.max(...[...known, ...other].map(([, y]) => y), now[1] || 0) || 1;
     plot.ink = undefined;
     plot.begin([factor * curve.low, factor * curve.high], [0, 1.12 * most], `${name}, ${unit}`, `rate, ${per}`);
     if (!known.length) plot.pen.fillText(WORDS.computing, plot.left + plot.font, plot.top + 2 * plot.font);
+    if (pinned !== curve) plot.line(other.map(([x, y]) => [factor * x, rate * y]), "grey", 1.2, [4, 3]);
     plot.line(known.map(([x, y]) => [factor * x, rate * y]), "third", 1.8);
     plot.frame(factor * now[0], Number.isFinite(now[1]) ? rate * now[1] : 0);
     plot.canvas.setAttribute("aria-label", `${name}: ${known.map(([x, y]) => `${short(factor * x, 3)} ${unit} ${short(rate * y, 3)} ${per}`).join(", ")}`);

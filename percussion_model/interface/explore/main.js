@@ -187,7 +187,7 @@ function drawCurves(only) {
   part("turning").hidden = !state.scene.get("effects.rotation");
   for (const [key, plot, kind, name] of CURVES) {
     if ((only && only !== key) || (key === "rotation.speed" && part("turning").hidden)) continue;
-    figures.drawRates(figures[plot], state.curves[key], [state.scene.get(key), state.found?.rate], kind, name, state.imperial);
+    figures.drawRates(figures[plot], state.curves[key], state.pinned?.curves[key], [state.scene.get(key), state.found?.rate], kind, name, state.imperial);
   }
 }
 
@@ -238,9 +238,10 @@ function save(name, blob) {
 
 function csv() {
   const { time, columns } = state.blow, keys = Object.keys(columns);
+  const units = Object.fromEntries(table.columns.sample.map(({ name, unit }) => [name, unit]));
   const head = numberTexts(state.found, state.imperial).map(([name, text]) => `# ${name}: ${text}`);
   const rows = Array.from(time, (t, k) => [t, ...keys.map(key => columns[key][k])].join(","));
-  return [`# percussion_model ${tables.version}: ${state.scene.link()}`, ...head, ["time since the blow began", ...keys].join(","), ...rows].join("\n");
+  return [`# percussion_model ${tables.version}: ${state.scene.link()}`, ...head, ["time since the blow began [s]", ...keys.map(key => units[key] ? `${key} [${units[key]}]` : key)].join(","), ...rows].join("\n");
 }
 
 function picture() {
@@ -271,7 +272,7 @@ function pinnedWords() {
 }
 
 function pin() {
-  state.pinned = state.pinned || !state.found || state.found.refusal ? null : { found: state.found, blow: state.blow, link: state.scene.link() };
+  state.pinned = state.pinned || !state.found || state.found.refusal ? null : { found: state.found, blow: state.blow, curves: { ...state.curves }, link: state.scene.link() };
   part("pin").setAttribute("aria-pressed", String(Boolean(state.pinned)));
   part("pin").textContent = state.pinned ? WORDS.unpin : WORDS.pin;
   part("pinned").hidden = !state.pinned;
