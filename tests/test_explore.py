@@ -230,6 +230,9 @@ WRONG = {
         "preset": {"piston": [[1, -1, 2e11, 7850]]}
     },
     "effects.none: there is no such parameter": {"preset": {"values": {"effects.none": 1}}},
+    "a rod that is none": {"preset": {"rods": [None]}},
+    "no values": {"preset": {"values": None}},
+    "nothing": "own=bnVsbA",
     "feed.force = 1000000000000000.0 N": {"preset": {"values": {"feed.force": 1e15}}},
 }
 

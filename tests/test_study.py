@@ -284,51 +284,51 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     assert found == {number: number**2 for number in range(6)}
 
 
+def run_script(folder, text):
+    """Run a program in a process of its own; what it has done."""
+    (folder / "script.py").write_text(text)
+    words = [sys.executable, "script.py"]
+    return subprocess.run(
+        words, cwd=folder, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
 def test_workers_that_are_ended_within_a_message_hold_nobody_up(tmp_path):
     """The bug: a pool's own thread read on for ever, as the interpreter ended."""
-    script = tmp_path / "script.py"
-    script.write_text(
+    done = run_script(
+        tmp_path,
         "from percussion_model.analysis.study.workers import on_this_machine\n"
         "def work(number):\n"
         "    return bytes(number)\n"
         "if __name__ == '__main__':\n"
-        "    print(len(next(on_this_machine(work, [(2_000_000,)] * 20, 2))[1]))\n"
+        "    print(len(next(on_this_machine(work, [(2_000_000,)] * 20, 2))[1]))\n",
     )
-    done = subprocess.run(
-        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False,
-        timeout=60,
-    )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (0, "2000000\n", "")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no masks of signals there")
 def test_no_worker_hears_ctrl_c(tmp_path):
     """The bug: the first one did, where nothing before it had started what tracks resources."""
-    script = tmp_path / "script.py"
-    script.write_text(
+    done = run_script(
+        tmp_path,
         "import signal\n"
         "from percussion_model.analysis.study.workers import on_this_machine\n"
         "def work(number):\n"
         "    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])\n"
         "if __name__ == '__main__':\n"
-        "    print([deaf for _, deaf in on_this_machine(work, [(k,) for k in range(6)], 3)])\n"
+        "    print([deaf for _, deaf in on_this_machine(work, [(k,) for k in range(6)], 3)])\n",
     )
-    words = [sys.executable, str(script)]
-    assert subprocess.check_output(words, text=True, timeout=60) == f"{[True] * 6}\n"
+    assert done.stdout == f"{[True] * 6}\n"
 
 
 def test_a_script_that_workers_run_again_is_told_so(tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(
+    done = run_script(
+        tmp_path,
         "from percussion_model import Scene\n"
         "from percussion_model.analysis.study import study, table\n"
         "scene = Scene().computed_by('rigid')\n"
-        "study(scene, table({'feed.force': range(2000, 2040)}), 'out', processes=2)\n"
+        "study(scene, table({'feed.force': range(2000, 2040)}), 'out', processes=2)\n",
     )
-    done = subprocess.run(
-        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False,
-        timeout=120,
-    )  # fmt: skip
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].endswith('under `if __name__ == "__main__":`')
     assert done.stderr.count("Traceback") == 1  # of the script, none of its workers

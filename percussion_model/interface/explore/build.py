@@ -198,8 +198,7 @@ def _hammer(scene: Scene, title: str) -> dict[str, Any]:
 def _bit(name: str) -> dict[str, Any]:
     one = bit(name)
     count = round(one.buttons.value)
-    short = f"{1e3 * one.diameter:.0f} mm, {count} buttons"
-    return {"short": short, "diameter": one.diameter, "buttons": count, "gauge": one.gauge_buttons}
+    return {"diameter": one.diameter, "buttons": count, "gauge": one.gauge_buttons}
 
 
 def _uncertain(name: str) -> dict[str, list[tuple[str, float, float, float]]]:

@@ -15,6 +15,12 @@ export function shorter(title) {
   return title.replace("Granite of a continuum model", "Model granite").replace(", by its strength", "").replace(" of the reference scene", "");
 }
 
+// What tells one bit from another.
+export function bitTitle({ diameter, buttons }, imperial) {
+  const [unit, factor] = unitOf("length", imperial);
+  return `${short(factor * diameter, 3)} ${unit}, ${buttons} buttons`;
+}
+
 // Cards of one group: names with pictures and titles.
 function cards(box, group, options, chosen, choose) {
   box.innerHTML = options.map(({ name, title, picture }) =>
@@ -39,8 +45,7 @@ export class Inputs {
     const focused = document.activeElement?.name, { base } = scene, ownBit = scene.preset.bit_name;
     const change = values => this.change(Object.assign(scene.with({}), values));
     for (const entry of this.entries) entry.show(scene, this.imperial);
-    const chosen = [scene.hammer, scene.bit, scene.rock, this.imperial].join(), [unit, factor] = unitOf("length", this.imperial);
-    const bitTitle = ({ diameter, buttons }) => `${short(factor * diameter, 3)} ${unit}, ${buttons} buttons`;
+    const chosen = [scene.hammer, scene.bit, scene.rock, this.imperial].join();
     if (chosen === this.chosen) return;
     this.chosen = chosen;
     const all = Object.entries(hammers).sort(([one], [other]) => (other === OWN) - (one === OWN));
@@ -48,7 +53,7 @@ export class Inputs {
       ({ name, title: one.title, picture: hammerPicture(scene.tables.presets[name], one) })),
       scene.hammer, name => change({ hammer: name, bit: this.bitOf(name), values: {} }));
     const free = ownBit ? [] : [{ name: "", title: WORDS.given, picture: bitPicture({ diameter: base.hole, buttons: 9, gauge: 6 }) }];
-    cards(this.boxes[1], "bit", [...free, ...base.bits.map(name => ({ name, title: bitTitle(bits[name]), picture: bitPicture(bits[name]) }))],
+    cards(this.boxes[1], "bit", [...free, ...base.bits.map(name => ({ name, title: bitTitle(bits[name], this.imperial), picture: bitPicture(bits[name]) }))],
       scene.bitName, name => change({ bit: name, values: this.without(["breaking.", "rotation."]) }));
     cards(this.boxes[2], "rock", [{ name: "", title: WORDS.given, picture: rockPicture("hard") },
       ...Object.entries(rocks).map(([name, one]) => ({ name, title: one.title, picture: rockPicture(name) }))].map(one => ({ ...one, title: shorter(one.title) })),

@@ -1,7 +1,7 @@
 // The page: from a slider to what is drawn.
 import { Drawing } from "./drawing.js";
 import { Figures, prepared } from "./figures.js";
-import { Inputs, shorter } from "./inputs.js";
+import { Inputs, bitTitle, shorter } from "./inputs.js";
 import { short, unitOf } from "./numbers.js";
 import { Player } from "./player.js";
 import { numberTexts, rateText, showResult } from "./result.js";
@@ -267,7 +267,7 @@ function pinnedWords() {
     const [word, factor] = unitOf(unit, imperial);
     return `${name} ${short(factor * scene.get(key), 4)} ${word}`.trim();
   });
-  const names = [scene.base.title, tables.bits[scene.bitName]?.short, tables.rocks[scene.rock]?.title];
+  const names = [scene.base.title, scene.bitName && bitTitle(tables.bits[scene.bitName], imperial), tables.rocks[scene.rock]?.title];
   return { rate: rateText(found, imperial).filter(Boolean).join(" ± "), name: [...names, ...numbers].filter(Boolean).join("; ") };
 }
 

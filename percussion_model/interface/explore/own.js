@@ -8,14 +8,14 @@ const MOST_SECTIONS = 100, MOST_RODS = 40, MOST_TEXT = 200000, JOINT_NUMBERS = 6
 
 // Take a scene of a link into the tables; why it cannot be, in words, or nothing.
 export function takeOwn(tables, letters) {
-  let given;
+  let given, why;
   try {
     const bytes = Uint8Array.from(atob(letters.replaceAll("-", "+").replaceAll("_", "/")), one => one.charCodeAt(0));
     given = JSON.parse(new TextDecoder().decode(bytes));
-  } catch {
-    return fill(WORDS.badLink, { why: WORDS.notWhole });
+    why = wrong(tables, given);
+  } catch { // of another form than any scene
+    why = WORDS.notWhole;
   }
-  const why = wrong(tables, given);
   if (why) return fill(WORDS.badLink, { why });
   const { preset, hammer } = given;
   tables.presets[OWN] = preset;
