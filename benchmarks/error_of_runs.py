@@ -1,6 +1,6 @@
 """Error against core-seconds of what scenes are computed for: a coupled run, and a map.
 
-`python -m benchmarks.error_of_runs` prints both. Waves and explicit elements go through the
+`python -m docs.make_accuracy coupled map` computes both. Waves and explicit elements go through the
 same loops; truth is where both lead when refined, its bar half of what is left between them.
 """
 
@@ -81,7 +81,7 @@ def hang(way: Way, step: float) -> tuple[float, float]:
     return simulation.observe()["bit_position"], cost / DURATION
 
 
-def coupled(say: Callable[[str], None] = print) -> dict[str, Any]:
+def coupled(say: Callable[[str], None]) -> dict[str, Any]:
     """Coupled runs: error of the advance and time, by method and communication step."""
     say("coupled runs: reference")
     limits = [hang(way, FINEST)[0] for way in REFINED]
@@ -97,7 +97,7 @@ def coupled(say: Callable[[str], None] = print) -> dict[str, Any]:
     return {"duration": DURATION, "finest": FINEST, "bar": bar, "rows": rows}
 
 
-def points_map(say: Callable[[str], None] = print) -> dict[str, Any]:
+def points_map(say: Callable[[str], None]) -> dict[str, Any]:
     """Map over feed and rock: errors of the rate and core-seconds, by method."""
     errors: dict[str, list[float]] = {name: [] for name in METHODS}
     costs = dict.fromkeys(METHODS, 0.0)
@@ -160,21 +160,3 @@ def point(scene: Scene) -> tuple[float, dict[str, tuple[float, float]]] | None:
         value, run = rate(way)
         here[name] = abs(value / truth - 1.0), run.setup_time + run.cost()
     return bar, here
-
-
-def main() -> None:
-    found = coupled()
-    for row in found["rows"]:
-        print(f"{row['method']}, {row['step']:.2g} s: {row['error']:.1e}, {row['second']:.3g} s/s")
-    print(f"bar {found['bar']:.1e}")
-    found = points_map()
-    for row in found["rows"]:
-        print(
-            f"{row['method']}: {row['core_seconds']:.3g} s, median {row['median']:.1e}, "
-            f"greatest {row['greatest']:.1e}, above 1 %: {row['above']} of {row['points']}"
-        )
-    print(f"{found['left_out']} of {found['points']} left out; bar {found['bar']:.1e}")
-
-
-if __name__ == "__main__":
-    main()

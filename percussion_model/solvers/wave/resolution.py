@@ -2,7 +2,7 @@
 
 Where there are rods contacts that begin within a step count from its nearer end: the error of a
 rate is of first order in the step. Top hammers of four rods were off by 0.4 to 0.9 % with 20 steps
-in the piston (`benchmarks.top_hammer`, docs/top_hammer.md).
+in the piston (`benchmarks.hammers`, docs/top_hammer.md).
 """
 
 from __future__ import annotations
