@@ -1,6 +1,6 @@
 """Error against core-seconds of what scenes are computed for: a coupled run, and a map.
 
-`python -m docs.make_accuracy coupled map` computes both. Waves and explicit elements go through the
+`python -m docs.make accuracy coupled map` computes both. Waves and explicit elements go through the
 same loops; truth is where both lead when refined, its bar half of what is left between them.
 """
 

@@ -10,10 +10,9 @@ import json
 import math
 import textwrap
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from docs.blocks import renewed
+from docs.blocks import DOCS
 from percussion_model.interface.commands.accuracy_tables import (
     bounds_text,
     ratio_text,
@@ -45,7 +44,6 @@ from percussion_model.verification.accuracy.problems import (
 )
 from percussion_model.verification.accuracy.study import WANTED, Point
 
-DOCS = Path(__file__).resolve().parent
 DATA = DOCS / "accuracy"
 # Scenes of the comparison: all shipped ones whose blows are alike, and those drawn by seed.
 COMPARED = (
@@ -416,7 +414,7 @@ def scene_page(name: str) -> str:
     what = "Relative standard errors" if study.kind == APERIODIC else "Relative errors"
     return f"""# {study.title}
 
-Made by `python -m docs.make_accuracy`; [accuracy.md](../accuracy.md) says what the columns mean.
+Made by `python -m docs.make accuracy`; [accuracy.md](../accuracy.md) says what the columns mean.
 
 ![Error against time](../images/accuracy_{name}.png)
 {more}
@@ -450,13 +448,4 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "orders": reference_orders,
     "machine": machine,
 }
-FILLED = (
-    *(DOCS / "accuracy.md", DOCS / "data" / "costs.md", DOCS / "data" / "modes.md"),
-    DOCS.parent / "README.md",
-)
-
-
-def pages() -> dict[Path, str]:
-    """All pages that follow from the data, by file."""
-    scenes = {DATA / f"{name}.md": scene_page(name) for name in (*COMPARED, *OTHERS)}
-    return scenes | {path: renewed(path, BLOCKS) for path in FILLED}
+FILLED = ("accuracy.md", "data/costs.md", "data/modes.md", "../README.md")

@@ -1,21 +1,35 @@
-"""Pages whose blocks are made anew.
-
-A block stands between `<!-- begin NAME -->` and `<!-- end -->`.
-"""
+"""What is made of pages: blocks between `<!-- begin NAME -->` and `<!-- end -->`, and figures."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from percussion_model.interface.plotting.style import save_figures
-from percussion_model.scene.text import write_text
-
 DOCS = Path(__file__).resolve().parent
+IMAGES = DOCS / "images"
+REFERENCE = DOCS.parent / "scenarios" / "reference.toml"
 BLOCK = re.compile(r"(<!-- begin (\w+) -->)\n.*?(<!-- end -->)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a module of `docs/pages` makes."""
+
+    pages: tuple[str, ...] = ()  # files within docs/ that have the blocks
+    blocks: Mapping[str, str | Callable[[], str]] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)  # of whole files within docs/
+    figures: Callable[[], Iterable[tuple[str, Figure]]] | None = None  # with their names
+    dpi: float | None = None
+    kinds: tuple[str, ...] = ("png",)
+
+    def files(self) -> dict[Path, str]:
+        """Texts of all files as they should be."""
+        whole = {DOCS / name: text for name, text in self.texts.items()}
+        return whole | {DOCS / name: renewed(DOCS / name, self.blocks) for name in self.pages}
 
 
 def renewed(page: Path, blocks: Mapping[str, str | Callable[[], str]]) -> str:
@@ -32,16 +46,3 @@ def renewed(page: Path, blocks: Mapping[str, str | Callable[[], str]]) -> str:
         return f"{found[1]}\n{block if isinstance(block, str) else block()}\n{found[3]}"
 
     return BLOCK.sub(made, page.read_text(encoding="utf-8"))
-
-
-def publish(
-    blocks: Mapping[str, str | Callable[[], str]],
-    *pages: Path,
-    figures: Callable[[], Iterable[tuple[str, Figure]]] | None = None,
-    dpi: float | None = None,
-) -> None:
-    """Write pages with their blocks made anew, and draw figures into docs/images."""
-    if figures is not None:
-        save_figures(figures, DOCS / "images", ("png",), dpi=dpi)
-    for page in pages:
-        write_text(page, renewed(page, blocks))

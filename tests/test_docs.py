@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from docs import make
 from docs.blocks import renewed
+from docs.pages import parameters
 from percussion_model import Scene
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -62,12 +62,14 @@ def test_scene_excerpt_is_a_scene():
 
 
 def test_parameter_page_is_current():
-    path = ROOT / "docs" / "make_parameters.py"
-    spec = importlib.util.spec_from_file_location("make_parameters", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    written = path.with_name("parameters.md").read_text(encoding="utf-8")
-    assert module.page() == written, "run: python -m docs.make_parameters"
+    ((path, text),) = parameters.made().files().items()
+    assert text == path.read_text(encoding="utf-8"), "run: python -m docs.make parameters"
+
+
+def test_what_can_be_made_is_told():
+    with pytest.raises(SystemExit) as told:
+        make.main(["what"])
+    assert re.findall(r"^(\w+): ", str(told.value), re.MULTILINE) == make.names()
 
 
 @pytest.mark.parametrize("name", ["model", "numerics"])
@@ -128,7 +130,7 @@ def test_guides_are_short():
     assert sum(words_by_hand(page.read_text(encoding="utf-8")) for page in pages) <= 25_000
 
 
-# What scripts write in full; other pages mark what scripts write into them.
+# What scripts write in full, or but for a head; other pages mark what scripts write into them.
 MADE = (
     *("docs/parameters.md", "docs/reference/outputs.md", "docs/reference/command_line.md"),
     *("docs/data/fmu_interface.md", "docs/data/system_variables.md", "docs/data/hard_cases.md"),

@@ -13,8 +13,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from docs.blocks import IMAGES, REFERENCE
 from docs.drawings import fronts, house, system, waves
-from docs.make_drawings import DPI, DRAWINGS, IMAGES, REFERENCE
+from docs.pages.drawings import DPI, DRAWINGS
 from fmu_src.parts.build import PARTS
 from fmu_src.system.archive import HAMMER, read_plan
 from percussion_model import Scene
@@ -93,7 +94,7 @@ def test_drawings_of_the_code_are_current(name):
     written = {html.unescape(text) for text in re.findall(r"<!-- (.*?) -->", svg)}
     with matplotlib.rc_context(STYLE):
         drawn = {text.get_text() for text in DRAWINGS[name]().axes[0].texts}
-    assert drawn <= written, f"run: python -m docs.make_drawings {name}"
+    assert drawn <= written, f"run: python -m docs.make drawings {name}"
 
 
 def test_every_drawing_is_there():

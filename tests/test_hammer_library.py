@@ -191,5 +191,5 @@ def test_json_has_all_numbers_with_unit_and_source(capsys):
 
 
 def test_the_page_is_current():
-    module = importlib.import_module("docs.make_hammers")
-    assert module.page() == module.PAGE.read_text(encoding="utf-8"), "python -m docs.make_hammers"
+    ((path, text),) = importlib.import_module("docs.pages.hammers").made().files().items()
+    assert text == path.read_text(encoding="utf-8"), "python -m docs.make hammers"

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from docs import make_rates
+from docs.blocks import DOCS
 from percussion_model.scene.rocks import rock
 from percussion_model.scene.rocks.breaking import breaking_numbers, energy_by_strength
 from percussion_model.scene.scene import Scene
@@ -208,11 +208,11 @@ def test_verdicts_are_data():
 
 
 def test_the_page_has_these_numbers():
-    page = make_rates.PAGE.read_text(encoding="utf-8")
+    page = (DOCS / "data" / "rates.md").read_text(encoding="utf-8")
     for name in ("top_25", "dth_1"):
         case = by_id(name)
         texts = cells(RateRow(case, predict(case)))
-        assert f"| {' | '.join(texts)} |" in page, "run: python -m docs.make_rates"
+        assert f"| {' | '.join(texts)} |" in page, "run: python -m docs.make rates"
     stored = stored_cases()
     for case in stored.cases:
         assert f"| {case.id} | {case.rock}, {case.site} |" in page

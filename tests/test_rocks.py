@@ -212,5 +212,5 @@ def test_the_list_names_all_and_a_name_tells_of_one(percussion, monkeypatch):
 
 
 def test_the_page_of_rocks_is_current():
-    module = importlib.import_module("docs.make_rocks")
-    assert module.page() == module.PAGE.read_text(encoding="utf-8"), "python -m docs.make_rocks"
+    ((path, text),) = importlib.import_module("docs.pages.rocks").made().files().items()
+    assert text == path.read_text(encoding="utf-8"), "python -m docs.make rocks"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from docs import make_reference
+from docs.pages import reference
 from percussion_model import Scene, simulate
 from percussion_model.simulation.columns import ENERGY_COLUMNS, SUMMARY_COLUMNS
 
@@ -53,10 +53,9 @@ def test_every_equation_is_drawn_without_a_script_from_elsewhere(site):
         assert not re.findall(outside, one.read_text("utf-8")), one.name
 
 
-@pytest.mark.parametrize("name", make_reference.PAGES)
-def test_pages_made_of_the_code_are_current(name):
-    written = (make_reference.FOLDER / name).read_text(encoding="utf-8")
-    assert make_reference.PAGES[name]() == written, "run: python -m docs.make_reference"
+def test_pages_made_of_the_code_are_current():
+    for path, text in reference.made().files().items():
+        assert path.read_text(encoding="utf-8") == text, "run: python -m docs.make reference"
 
 
 def test_every_number_of_a_summary_is_explained():

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from docs import make_validation
+from docs.blocks import DOCS
 from percussion_model.verification import rates
 from percussion_model.verification.measured import FitPlan, Measurement, compare, load, wanted
 from percussion_model.verification.measured.blow import Reading, Rig, rebound, strike
@@ -147,13 +147,13 @@ def test_what_was_fitted_is_reached(found):
 
 
 def test_the_page_has_these_numbers(found):
-    page = make_validation.PAGE.read_text(encoding="utf-8")
+    page = (DOCS / "validation.md").read_text(encoding="utf-8")
     before, _, rest = page.partition("<!-- begin tables -->")
     assert rest.count("<!-- end -->") == 1
     for row in found.rows:
         texts = [one.replace(MISSED, f"**{MISSED}**") for one in cells(row)]
         assert f"| {' | '.join(texts)} |" in page, (
-            f"run: python -m docs.make_validation ({row.experiment}, {row.id})"
+            f"run: python -m docs.make validation ({row.experiment}, {row.id})"
         )
     for one in found.fits:
         assert parameters_text(one) in page

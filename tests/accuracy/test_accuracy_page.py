@@ -10,16 +10,18 @@ from pathlib import Path
 import pytest
 
 from docs import accuracy_page
-from docs.make_drawn_scenes import COUNT, FOLDER, drawn
+from docs.pages import accuracy
+from docs.pages.drawn_scenes import COUNT, drawn
 from percussion_model import Scene
 from percussion_model.verification.accuracy.references import fingerprint
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_pages_say_what_the_data_say():
-    for path, text in accuracy_page.pages().items():
-        assert path.read_text(encoding="utf-8") == text, "run: python -m docs.make_accuracy page"
+    for path, text in accuracy.pages().files().items():
+        assert path.read_text(encoding="utf-8") == text, "run: python -m docs.make accuracy page"
 
 
 def test_readme_states_the_advantage_of_the_stored_studies_and_no_other():
@@ -47,7 +49,7 @@ def test_a_faster_peer_changes_the_sentence(monkeypatch):
 
 @pytest.mark.parametrize("place", range(COUNT))
 def test_drawn_scenes_are_those_of_the_seed(place):
-    path = FOLDER / f"drawn_{place + 1}.toml"
+    path = ROOT / "scenarios" / "drawn" / f"drawn_{place + 1}.toml"
     title = tomllib.loads(path.read_text(encoding="utf-8"))["title"]
     number = int(title.rsplit(" ", 1)[1])
     scene = next(islice(drawn(), number - 1, None))

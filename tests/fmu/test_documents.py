@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from pathlib import Path
 
+from docs.pages import fmu_interface
 from fmu_src.description import About
 from fmu_src.hammer.variables import hammer_variables
 from fmu_src.page import write_page
 from percussion_model import Scene
 
 ROOT = Path(__file__).parents[2]
-TABLES = ROOT / "docs" / "data" / "fmu_interface.md"
 HOW_TO = ROOT / "docs" / "how_to" / "use_the_fmu.md"
 
 
 def test_the_tables_are_those_of_the_model_description():
-    path = ROOT / "docs" / "make_fmu_interface.py"
-    spec = importlib.util.spec_from_file_location("make_fmu_interface", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.page() == TABLES.read_text(encoding="utf-8"), "run: " + module.__doc__
+    ((path, text),) = fmu_interface.made().files().items()
+    assert text == path.read_text(encoding="utf-8"), "run: python -m docs.make fmu_interface"
 
 
 def test_the_examples_run(hammer, capsys):

@@ -296,7 +296,7 @@ def test_the_page_tells_of_every_case_and_knows_every_reason():
     text = PAGE.read_text(encoding="utf-8")
     for name, case in hard_cases().items():
         for solver in case.solvers:
-            assert f"| {name} | {solver} |" in text, "run: python -m docs.make_stability"
-        assert case.hard in text, "run: python -m docs.make_stability"
+            assert f"| {name} | {solver} |" in text, "run: python -m docs.make stability"
+        assert case.hard in text, "run: python -m docs.make stability"
     assert "all of this holds for all of them" in text
     assert "not known" not in text

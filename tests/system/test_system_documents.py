@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import importlib.util
 import re
-from pathlib import Path
 
 from typer.main import get_command
 
-from docs import make_system
-from docs.blocks import renewed
+from docs.blocks import DOCS
+from docs.pages import system
 from fmu_src.command_line import app
 from fmu_src.commands.scenario import _scripts
 from fmu_src.system.archive import read_plan
 from percussion_model.scene.presets import scenario_folder
 
-PAGE = Path(make_system.__file__).with_name("system.md")
+PAGE = DOCS / "system.md"
 HOW_TO = PAGE.parent / "how_to"
 CONTROLLER, SYSTEM = HOW_TO / "couple_a_controller.md", HOW_TO / "write_a_system.md"
 SCENARIOS = HOW_TO / "run_the_scenarios.md"
@@ -23,10 +22,8 @@ PAGES = (PAGE, CONTROLLER, SYSTEM, SCENARIOS)
 
 
 def test_the_tables_are_current():
-    told = "run: " + make_system.__doc__
-    assert renewed(PAGE, {"signals": make_system.signals}) == PAGE.read_text(encoding="utf-8"), told
-    written = make_system.VARIABLES.read_text(encoding="utf-8")
-    assert make_system.variables_page() == written, told
+    for path, text in system.made().files().items():
+        assert text == path.read_text(encoding="utf-8"), "run: python -m docs.make system"
 
 
 def test_commands_exist():

@@ -1,11 +1,11 @@
-"""Write docs/data/hammers.md from the hammers that are stored: `python -m docs.make_hammers`."""
+"""Hammers that are stored, number by number."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from textwrap import fill
 
+from docs.blocks import Made
 from percussion_model.interface.commands.hammers import HEADINGS, NOTE, cells, number_cells
 from percussion_model.scene.hammers.library import (
     StoredHammer,
@@ -14,20 +14,6 @@ from percussion_model.scene.hammers.library import (
     stored_hammers,
 )
 from percussion_model.simulation.markdown import table
-
-PAGE = Path(__file__).parent / "data" / "hammers.md"
-HEAD = f"""# Hammers on the market
-
-What makers tell of hammers down the hole and of top hammers, number by number. `percussion hammers`
-prints this table, `percussion hammers NAME` all of one. In Python: `stored_hammer("hc-25")` of
-`percussion_model.scene.hammers.library`. They are data, no scenes; [sources of the
-scenes](hammer_sources.md) are another page.
-
-{fill(NOTE, 110)}
-
-`python -m docs.make_hammers` writes this page from the files in
-`percussion_model/scene/hammers/library`.
-"""
 
 
 def numbers(one: StoredHammer) -> Iterable[tuple[str, ...]]:
@@ -47,8 +33,8 @@ def section(one: StoredHammer) -> str:
     return f"\n## {one.title}\n\n`{one.name}`, driven by {one.kind}.{scene}{note}\n\n{rows}"
 
 
-def page() -> str:
-    """Text of the page."""
+def tables() -> str:
+    """All hammers in one table, each in its own, and sources."""
     chosen = [stored_hammer(name) for name in stored_hammers()]
     rows = [(f"`{name}`", *rest) for name, *rest in map(cells, chosen)]
     read = [
@@ -56,14 +42,14 @@ def page() -> str:
         for key, one in sources().items()
     ]
     lines = [
-        HEAD,
         table(HEADINGS, rows),
         *map(section, chosen),
         "\n## Sources\n",
         table(("name", "cited", "read in", "second hand"), read),
     ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)
 
 
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+def made() -> Made:
+    """The note and the tables."""
+    return Made(("data/hammers.md",), {"note": fill(NOTE, 110), "hammers": tables})

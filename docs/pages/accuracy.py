@@ -1,7 +1,6 @@
-"""Measure what docs/accuracy.md shows, and write its pages: `python -m docs.make_accuracy`.
+"""Accuracy by time: what is named is measured, all if nothing is; `page` only writes pages.
 
-Names of scenes as arguments make only theirs; `page` only writes the pages again from
-docs/accuracy/*.json, README.md included. All of it takes some ten minutes of one core.
+They follow from docs/accuracy/*.json, README.md included. All takes some ten minutes of one core.
 """
 
 from __future__ import annotations
@@ -9,18 +8,28 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Iterator
 from typing import Any
 
-import matplotlib
+from matplotlib.figure import Figure
 
-from docs.accuracy_page import COMPARED, DATA, DOCS, OTHERS, load, load_studies, pages
+from docs.accuracy_page import (
+    BLOCKS,
+    COMPARED,
+    DATA,
+    FILLED,
+    OTHERS,
+    load,
+    load_studies,
+    scene_page,
+)
+from docs.blocks import IMAGES, Made
 from percussion_model.interface.plotting import style
 from percussion_model.interface.plotting.error_against_time import (
     draw_accuracy,
     draw_quantities,
 )
 
-IMAGES = DOCS / "images"
 # The methods of each scene; the reference scene gets all of them.
 PEERS = ("modal", "wave", "explicit", "exact-flow", "fem", "rigid")
 METHODS: dict[str, tuple[str, ...] | None] = {
@@ -111,17 +120,19 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def write_pages() -> None:
-    """Write all pages and draw all figures from the data."""
-    for path, text in pages().items():
-        path.write_text(text, encoding="utf-8")
+def figures() -> Iterator[tuple[str, Figure]]:
+    """All figures, drawn from the data."""
     studies = load_studies((*COMPARED, *OTHERS))
-    with matplotlib.rc_context(style.STYLE):
-        for name, found in studies.items():
-            style.save_png(draw_accuracy(found), IMAGES / f"accuracy_{name}.png", DPI)
-        figure = draw_quantities(studies["reference"])
-        style.save_png(figure, IMAGES / "accuracy_quantities_reference.png", DPI_OF_MANY)
+    yield from ((f"accuracy_{name}", draw_accuracy(found)) for name, found in studies.items())
+    figure = draw_quantities(studies["reference"])
+    style.save_png(figure, IMAGES / "accuracy_quantities_reference.png", DPI_OF_MANY)
     draw_steps()
+
+
+def pages() -> Made:
+    """All pages and figures from the data."""
+    scenes = {f"accuracy/{name}.md": scene_page(name) for name in (*COMPARED, *OTHERS)}
+    return Made(FILLED, BLOCKS, scenes, figures, DPI)
 
 
 EXTRA = {
@@ -132,19 +143,11 @@ EXTRA = {
 }
 
 
-def main(words: list[str]) -> None:
-    """Measure what is named, all if nothing is, and write the pages."""
-    known = [*METHODS, *EXTRA, "page"]
-    for word in words:
-        if word not in known:
-            sys.exit(f"{word}: one of {', '.join(known)}")
-    for word in words or known:
+def made(*words: str) -> Made:
+    """Measure what is named, all if nothing is."""
+    for word in words or (*METHODS, *EXTRA):
         if word in METHODS:
             measure(word)
-        elif word in EXTRA:
+        elif word != "page":
             EXTRA[word]()
-    write_pages()
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+    return pages()

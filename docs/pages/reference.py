@@ -1,12 +1,12 @@
-"""Write the pages of docs/reference that come from the code: `python -m docs.make_reference`."""
+"""Columns of outputs and commands, from the code."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 from collections.abc import Iterable
-from pathlib import Path
 
+from docs.blocks import Made
 from percussion_model.analysis.study.response import FOUND, KINDS
 from percussion_model.physics.records import (
     BLOW_COLUMNS,
@@ -19,15 +19,6 @@ from percussion_model.physics.records import (
 from percussion_model.simulation.columns import ENERGY_COLUMNS, SUMMARY_COLUMNS
 from percussion_model.simulation.markdown import table
 
-FOLDER = Path(__file__).with_name("reference")
-MADE = "This page is written by `python -m docs.make_reference`."
-
-OUTPUTS = f"""# Output columns
-
-Every column and number that a run writes, with its unit and its meaning. Positions point down.
-Forces on rock and contact are positive in compression. [The model](../model.md) has the
-definitions with equations. {MADE}
-"""
 STUDY_ONLY = (
     Column("kind", "", f"what the motion is: {', '.join(KINDS)}"),
     Column("order", "", "blows after which the motion repeats"),
@@ -58,7 +49,7 @@ def numbers(kinds: Iterable[Mode | EventKind]) -> str:
 
 
 def outputs() -> str:
-    """Text of the page of outputs."""
+    """A table for each kind of output."""
     parts = {
         "Summary": "`summary.json`, `--json`, `Result.summary()`. Means are over the counted "
         "blows.\n\n" + listed(SUMMARY_COLUMNS),
@@ -74,25 +65,22 @@ def outputs() -> str:
         "Points of a study": "`points.csv`, `points.nc` and, with pyarrow, `points.parquet` of "
         "`percussion study`, beside the parameters that vary.\n\n" + listed(study_columns()),
     }
-    return OUTPUTS + "".join(f"\n## {head}\n\n{text}\n" for head, text in parts.items())
+    return "\n".join(f"## {head}\n\n{text}\n" for head, text in parts.items()).rstrip()
 
 
 def command_line() -> str:
-    """Text of the page of commands, which typer makes."""
-    made = subprocess.run(
+    """What each command takes, which typer tells."""
+    told = subprocess.run(
         [
             *(sys.executable, "-m", "typer", "fmu_src.command_line"),
             *("utils", "docs", "--name", "percussion"),
         ],
         capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
-    text = made.replace("# `percussion`\n", f"# Command line\n\n{MADE}\n", 1)
-    return text.replace("```console", "```text").rstrip() + "\n"
+    return told.removeprefix("# `percussion`\n\n").replace("```console", "```text").rstrip()
 
 
-PAGES = {"outputs.md": outputs, "command_line.md": command_line}
-
-
-if __name__ == "__main__":
-    for name, write in PAGES.items():
-        (FOLDER / name).write_text(write(), encoding="utf-8")
+def made() -> Made:
+    """Both pages."""
+    pages = ("reference/outputs.md", "reference/command_line.md")
+    return Made(pages, {"outputs": outputs, "commands": command_line})

@@ -1,7 +1,4 @@
-"""Rates of presets, over rotation and over feed: `python -m docs.make_breaking`.
-
-Writes docs/images/breaking.png and the table of docs/breaking.md. Takes a minute.
-"""
+"""Rates of presets, over rotation and over feed; takes a minute."""
 
 from __future__ import annotations
 
@@ -13,9 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from docs.blocks import DOCS, publish
+from docs.blocks import Made
 from percussion_model import Scene, simulate
-from percussion_model.interface.plotting import style
 from percussion_model.scene.bits import bit, bit_of
 from percussion_model.scene.hammers import hammer, hammers, with_chambers
 from percussion_model.scene.rocks import rock
@@ -255,20 +251,20 @@ def draw_feed(axes: Axes, series: dict[float, list[dict[str, float]]]) -> None:
     axes.legend(loc="lower left")
 
 
-def main() -> None:
-    """Compute and write all."""
+def draw() -> Iterator[tuple[str, Figure]]:
+    """Rates over rotation and over feed."""
     scene = on_rock(ROCKS[0], hammer("dth5"))
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_rotation(left, over_rotation(scene))
     draw_feed(right, {motor: over_feed(scene, motor) for motor in MOTORS})
-    style.save_png(figure, DOCS / "images" / "breaking.png", 110)
+    yield "breaking", figure
+
+
+def made() -> Made:
+    """All of it."""
     blocks = {
         "presets": lambda: table(HEADINGS, preset_rows()),
         "feeds": lambda: table(FEED_HEADINGS, feed_rows()),
     }
-    publish(blocks, DOCS / "breaking.md")
-
-
-if __name__ == "__main__":
-    main()
+    return Made(("breaking.md",), blocks, figures=draw, dpi=110)

@@ -1,4 +1,4 @@
-"""Write the scenes of scenarios/drawn, drawn by seed: `python -m docs.make_drawn_scenes`.
+"""Scenes of scenarios/drawn, drawn by seed.
 
 Geometry, rock, feed and drive are drawn evenly, ratios and wide ranges by their logarithm,
 lengths to a millimetre. The first `COUNT` whose motion is periodic with one blow a cycle, and
@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
+from docs.blocks import Made
 from percussion_model import Scene, settled
 
-FOLDER = Path(__file__).resolve().parent.parent / "scenarios" / "drawn"
 SEED, COUNT = 15, 4
 PISTON = 0.15, 0.35  # m
 BIT_BY_PISTON = 0.7, 2.5
@@ -27,7 +26,7 @@ REVERSAL = 0.01, 0.08  # m
 MODES, SHRINKING = 40, 0.5
 RUN = {"run.duration": 2.0, "run.settle": 0.6}  # s
 TEXT = """\
-# Drawn with seed {seed} by docs/make_drawn_scenes.py; all else is as in the reference.
+# Drawn with seed {seed} by docs/pages/drawn_scenes.py; all else is as in the reference.
 title = "{scene.title}"
 
 [[piston.sections]]
@@ -78,22 +77,18 @@ def drawn() -> Iterator[Scene]:
         )
 
 
-def main() -> None:
-    """Judge, tell, and write what is kept."""
-    FOLDER.mkdir(exist_ok=True)
-    kept = 0
+def made() -> Made:
+    """Judge, tell, and keep."""
+    kept: dict[str, str] = {}
     for number, scene in enumerate(drawn(), 1):
         found = settled(scene.replace(**{"solver.cells": MODES}))
         print(f"{number}: {found.kind}, {found.order} a cycle, multiplier {found.multiplier:.2g}")
         if found.order != 1 or not abs(found.multiplier) < SHRINKING:
             continue
-        kept += 1
+        place = len(kept) + 1
         text = TEXT.format(seed=SEED, scene=scene)
-        text = text.replace(scene.title, f"Drawn scene {kept}, draw {number}")
-        (FOLDER / f"drawn_{kept}.toml").write_text(text, encoding="utf-8")
-        if kept == COUNT:
-            return
-
-
-if __name__ == "__main__":
-    main()
+        text = text.replace(scene.title, f"Drawn scene {place}, draw {number}")
+        kept[f"../scenarios/drawn/drawn_{place}.toml"] = text
+        if place == COUNT:
+            break
+    return Made(texts=kept)

@@ -1,18 +1,12 @@
-"""Write the tables of docs/validation.md and its figures: `python -m docs.make_validation`.
-
-Takes some seconds.
-"""
+"""Published experiments beside computed ones."""
 
 from __future__ import annotations
 
-from docs.blocks import DOCS, publish
+from docs.blocks import Made
 from percussion_model.interface.plotting.validation import draw_all
 from percussion_model.interface.progress import count_bar
 from percussion_model.verification.measured import Comparison, compare, load, wanted
 from percussion_model.verification.measured.table import NOTES, markdown
-
-PAGE = DOCS / "validation.md"
-DPI = 90
 
 
 def block(found: Comparison) -> str:
@@ -22,15 +16,11 @@ def block(found: Comparison) -> str:
     return "\n".join([*lines, "", *markdown(found), "### Wanted", "", *rows])
 
 
-def main() -> None:
-    """Compute, write the page and draw the figures."""
+def made() -> Made:
+    """Compute."""
     with count_bar("fits") as progress:
         found = compare(load(), progress=progress)
-    publish(
-        {"tables": block(found)}, PAGE, dpi=DPI,
+    return Made(
+        ("validation.md",), {"tables": block(found)}, dpi=90,
         figures=lambda: ((f"validation_{name}", figure) for name, figure in draw_all(found)),
     )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

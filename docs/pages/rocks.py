@@ -1,11 +1,11 @@
-"""Write docs/rocks.md from the rocks that are stored: `python -m docs.make_rocks`."""
+"""Rocks and bits that are stored."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from textwrap import fill
 
+from docs.blocks import Made
 from percussion_model.interface.commands.bits import HEADINGS as BIT_HEADINGS
 from percussion_model.interface.commands.bits import NOTE as BIT_NOTE
 from percussion_model.interface.commands.bits import cells as bit_cells
@@ -23,20 +23,6 @@ from percussion_model.scene.rocks.breaking import breaking_numbers
 from percussion_model.scene.rocks.derived import button_stiffness, mean_factor, pressure_factors
 from percussion_model.simulation.markdown import table
 
-PAGE = Path(__file__).with_name("rocks.md")
-HEAD = f"""# Rocks and bits
-
-`percussion run SCENE --rock kuru-granite` takes law and numbers of a rock, for the bit that the
-scene has (`--bit dth-140`), or, as in `kuru-granite:10`, for ten buttons; `--set` wins over it.
-All commands that take a scene take it, and so do `new`, `fmu` and `native`. In Python:
-`Scene().replace(**rock("kuru-granite", buttons=10).parameters)`, with `rock` of
-`percussion_model.scene.rocks`. `percussion rocks` prints this table, `percussion rocks NAME` all
-of one.
-
-{fill(" ".join(NOTES), 110)}
-
-`python -m docs.make_rocks` writes this page from the files in `percussion_model/scene/rocks`.
-"""
 DERIVED = """
 ## Stiffness by strength
 
@@ -120,21 +106,17 @@ def told(one: Number) -> str:
     return f"{interval_text(one)}{unit}, {kind_text(one)}: {one.why}"
 
 
-def page() -> str:
-    """Text of the page."""
+def tables() -> str:
+    """All of it, Markdown."""
     chosen, factors = [rock(name) for name in rocks()], pressure_factors()
     values = factors.values()
     words = DERIVED.format(mean=mean_factor(values), low=min(values), high=max(values))
     lines = [
-        HEAD.rstrip(),
-        *numbers(chosen),
-        words.rstrip(),
-        *check(factors),
-        *bit_lines(),
-        *sources(chosen),
-    ]
-    return "\n".join(lines) + "\n"
+        *numbers(chosen), words.rstrip(), *check(factors), *bit_lines(), *sources(chosen),
+    ]  # fmt: skip
+    return "\n".join(lines).strip()
 
 
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+def made() -> Made:
+    """The notes and the tables."""
+    return Made(("rocks.md",), {"notes": fill(" ".join(NOTES), 110), "rocks": tables})

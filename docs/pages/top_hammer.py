@@ -1,21 +1,14 @@
-"""Make figures and tables of top hammers: `python -m docs.top_hammer_page`.
-
-They stand in docs/top_hammer.md; the long ones in docs/data/top_hammer.md.
-
-Runs every hammer with some numbers of rods, and reports on one string; takes a minute.
-"""
+"""Every hammer with some numbers of rods, and a report on one string; takes a minute."""
 
 from __future__ import annotations
 
-from docs.blocks import DOCS, publish
+from docs.blocks import Made
 from percussion_model import Result, simulate
 from percussion_model.analysis.drill_string import StringReport, string_report
 from percussion_model.interface.plotting.drill_string import bar_title, draw_string
 from percussion_model.scene.hammers import hammer, hammers
 from percussion_model.simulation.markdown import table
 
-PAGES = DOCS / "top_hammer.md", DOCS / "data" / "top_hammer.md"
-DPI = 100
 DURATION, SETTLE = 4.0, 1.0  # [s]
 RODS = (1, 2, 4, 6, 8)
 # The string that the figures show, and its gauges: middle of the first, second and last rod.
@@ -142,8 +135,8 @@ def at_the_rock(report: StringReport) -> str:
     )
 
 
-def main() -> None:
-    """Make the figures and the tables."""
+def made() -> Made:
+    """The figures and the tables."""
     report = string_report(hammer(SHOWN, SHOWN_RODS), DURATION, SETTLE, GAUGES)
     contents = {
         "rock": at_the_rock(report),
@@ -153,13 +146,9 @@ def main() -> None:
         "presets": presets(),
         "stresses": stresses(report),
     }
-    publish(
-        contents, *PAGES, dpi=DPI,
+    return Made(
+        ("top_hammer.md", "data/top_hammer.md"), contents, dpi=100,
         figures=lambda: (
             (name.replace("string", "top_hammer"), fig) for name, fig in draw_string(report)
         ),
     )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

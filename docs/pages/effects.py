@@ -1,19 +1,14 @@
-"""Write the table of docs/effects.md and its figure: `python -m docs.make_effects`.
-
-Takes a minute; an idle machine gives the better figures.
-"""
+"""What each effect costs and changes; takes a minute, and better an idle machine."""
 
 from __future__ import annotations
 
-from docs.blocks import DOCS, publish
+from docs.blocks import REFERENCE, Made
 from percussion_model import Scene
 from percussion_model.analysis.effect_study import EffectsStudy, study_effects
 from percussion_model.interface.commands.effects import table_of
 from percussion_model.interface.plotting.effect_bars import draw_effects
 from percussion_model.simulation.markdown import table
 from percussion_model.verification.accuracy.timing import machine
-
-REFERENCE = DOCS.parent / "scenarios" / "reference.toml"
 
 
 def block(found: EffectsStudy, computer: dict[str, object]) -> str:
@@ -31,15 +26,11 @@ def block(found: EffectsStudy, computer: dict[str, object]) -> str:
     )
 
 
-def main() -> None:
-    """Measure, write the page and draw the figure."""
+def made() -> Made:
+    """Measure."""
     computer = machine()
     found = study_effects(Scene.from_toml(REFERENCE))
-    publish(
-        {"effects": block(found, computer)}, DOCS / "effects.md", dpi=110,
+    return Made(
+        ("effects.md",), {"effects": block(found, computer)}, dpi=110,
         figures=lambda: [("effects", draw_effects(found))],
     )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

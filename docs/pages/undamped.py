@@ -1,7 +1,4 @@
-"""Study the rate of penetration against structural loss: `python -m docs.make_undamped`.
-
-Writes docs/images/undamped.png and the table of docs/data/undamped.md. Takes some minutes.
-"""
+"""Rate of penetration against structural loss; takes some minutes."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from docs.blocks import DOCS, publish
+from docs.blocks import Made
 from percussion_model import Scene, simulate
 from percussion_model.interface.plotting import style
 from percussion_model.simulation.markdown import table
@@ -132,18 +129,14 @@ def _rate(row: dict[str, Any]) -> str:
     return f"{rate:.2f} ± {error:.2f}" if error > 5e-3 else f"{rate:.3f}"
 
 
-def main() -> None:
-    """Make the figure and the table."""
+def made() -> Made:
+    """The figure and the table."""
     rows = []
     for row in rates():
         print({name: row[name] for name in ("loss", "cells", "rate", "error")}, file=sys.stderr)
         # what has not settled within the duration has no rate
         rows.append({name: math.nan if value is None else value for name, value in row.items()})
-    publish(
-        {"rates": block(rows)}, DOCS / "data" / "undamped.md", dpi=110,
+    return Made(
+        ("data/undamped.md",), {"rates": block(rows)}, dpi=110,
         figures=lambda: [("undamped", draw(rows))],
     )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,4 @@
-"""Write docs/data/fmu_interface.md from a model description: `python -m docs.make_fmu_interface`.
-
-The FMU of the reference scene is built for it, and read as any tool would.
-"""
+"""Variables of the hammer's FMU, built of the reference scene and read as any tool would."""
 
 from __future__ import annotations
 
@@ -11,19 +8,12 @@ from typing import Any
 
 from fmpy import read_model_description
 
+from docs.blocks import Made
 from fmu_src.hammer.build import build_hammer
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.markdown import table
 
 HEADINGS = ("name", "unit", "shown in", "start", "range", "meaning", "reference")
-PAGE = Path(__file__).parent / "data" / "fmu_interface.md"
-HEAD = """# Variables of the hammer's FMU
-
-This page lists every input, output and parameter of the [FMU of the hammer](../fmu.md), with
-unit, start value, bounds and value reference. The start values are those of the reference scene.
-Units are SI; *shown in* is the display unit that a tool may choose. `.venv/bin/python -m
-docs.make_fmu_interface` writes this page from a model description.
-"""
 HEADS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters"}
 
 
@@ -37,7 +27,7 @@ def tables() -> str:
     for causality, head in HEADS.items():
         rows = [_cells(one) for one in variables if one.causality == causality]
         parts.append(f"## {head}\n\n{table(HEADINGS, rows)}\n")
-    return "\n".join(parts)
+    return "\n".join(parts).rstrip()
 
 
 def _cells(one: Any) -> tuple[str, ...]:
@@ -54,11 +44,6 @@ def _cells(one: Any) -> tuple[str, ...]:
     return (f"`{one.name}`", unit, display, start, span, text, str(one.valueReference))
 
 
-def page() -> str:
-    """Text of the page."""
-    return f"{HEAD}\n{tables().rstrip()}\n"
-
-
-if __name__ == "__main__":
-    PAGE.parent.mkdir(exist_ok=True)
-    PAGE.write_text(page(), encoding="utf-8")
+def made() -> Made:
+    """The tables."""
+    return Made(("data/fmu_interface.md",), {"variables": tables})

@@ -1,31 +1,17 @@
-"""Write the tables of signals and variables of the drilling system: `python -m docs.make_system`.
-
-The signals stand in docs/system.md, the variables of the parts in docs/data/system_variables.md.
-"""
+"""Signals of the drilling system, and variables of its parts."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-from docs.blocks import publish
+from docs.blocks import Made
 from docs.drawings.system import SYSTEM, connected
 from fmu_src.parts.build import PARTS, part_variables
 from fmu_src.system.archive import read_plan
 from fmu_src.variables import Variable
 from percussion_model.simulation.markdown import table
 
-PAGE = Path(__file__).with_name("system.md")
-VARIABLES = Path(__file__).parent / "data" / "system_variables.md"
 HEADINGS = ("name", "kind", "unit", "start", "range", "meaning")
-HEAD = """# Variables of the drilling system
-
-This page lists every input, output and parameter of the parts of a [drilling
-system](../system.md). The hammer has [a page of its own](fmu_interface.md). Values are in SI units;
-down is positive. Of the six layers of rock only the first is listed: the others have the same
-variables, and are off until their `top` is set. `.venv/bin/python -m docs.make_system` writes this
-page from the tables of the parts.
-"""
 
 
 def signals() -> str:
@@ -37,13 +23,13 @@ def signals() -> str:
     return table(("from", "to", "unit", "meaning"), rows)
 
 
-def variables_page() -> str:
-    """Text of the page of the variables of all parts."""
-    lines = [HEAD.rstrip()]
+def variables() -> str:
+    """Tables of the variables of all parts, Markdown."""
+    parts = []
     for name, part in PARTS.items():
         rows = [_cells(one) for one in part_variables(part) if not _repeated(one.name)]
-        lines.append(f"\n## {name}\n\n{table(HEADINGS, rows)}")
-    return "\n".join(lines) + "\n"
+        parts.append(f"## {name}\n\n{table(HEADINGS, rows)}")
+    return "\n\n".join(parts)
 
 
 def _repeated(name: str) -> bool:
@@ -63,7 +49,7 @@ def _cells(one: Variable) -> tuple[str, ...]:
     return f"`{one.name}`", one.causality, one.unit or "", str(start), span, one.description
 
 
-if __name__ == "__main__":
-    VARIABLES.parent.mkdir(exist_ok=True)
-    VARIABLES.write_text(variables_page(), encoding="utf-8")
-    publish({"signals": signals}, PAGE)
+def made() -> Made:
+    """Both pages."""
+    pages = ("system.md", "data/system_variables.md")
+    return Made(pages, {"signals": signals, "variables": variables})

@@ -1,0 +1,1 @@
+"""Pages and figures that `python -m docs.make` makes, a module each."""
