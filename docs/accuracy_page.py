@@ -60,22 +60,6 @@ RUN = 4.0
 FORCES = (HISTORY, CONTACT_HISTORY, STRESS_HISTORY)
 FORCE_ERRORS = (3e-2, 1e-2)
 QUANTITIES_FIGURE = "\n![All quantities](../images/accuracy_quantities_reference.png)\n"
-SHORT = {
-    "rate_of_penetration": "rate",
-    "blow_period": "period",
-    "impact_velocity": "impact",
-    "rebound_velocity": "rebound",
-    "rock_energy": "energy",
-    "rock_share": "rock's share",
-    "loss_share": "loss's share",
-    "peak_bit_force": "peak bit force",
-    "peak_contact_force": "peak contact force",
-    "peak_stress": "peak stress",
-    "resting_place": "resting place",
-    HISTORY: "bit force, history",
-    CONTACT_HISTORY: "contact force, history",
-    STRESS_HISTORY: "stress, history",
-}
 
 
 def load(name: str) -> Any:
@@ -179,9 +163,8 @@ def force_table() -> str:
     for key in FORCES:
         for one in (summary(column) for column in contests(studies, key).values()):
             ratios = [bounds_text(value) for value in (one.luckiest, one.median, one.worst)]
-            rows.append(
-                [SHORT[key], percent(one.wanted), *ratios, f"{one.undecided} of {one.scenes}"]
-            )
+            what = QUANTITIES[key].short, percent(one.wanted)
+            rows.append([*what, *ratios, f"{one.undecided} of {one.scenes}"])
     return table(["quantity", "error", "luckiest", "median", "worst", "undecided"], rows)
 
 
@@ -380,7 +363,7 @@ def orders(study: Study, keys: Sequence[str]) -> str:
         cells = ["–" if one is None else str(one) for one in found]
         knob = "simulated time" if study.kind == APERIODIC else LADDERS[name].knob
         rows.append([LADDERS[name].title, knob, *cells])
-    return table(["method", "against", *(SHORT[key] for key in keys)], rows)
+    return table(["method", "against", *(QUANTITIES[key].short for key in keys)], rows)
 
 
 def rungs(study: Study) -> str:
@@ -398,8 +381,8 @@ def rungs(study: Study) -> str:
         spread = f" ± {two(100 * point.spread)} %" if math.isfinite(point.spread) else ""
         times = [f"{in_digits(1e3 * point.second)}{spread}", in_digits(1e3 * point.setup)]
         rows.append([title, label, *errors, *times])
-    head = [*(SHORT[key] for key in study.quantities), "ms a simulated second", "set-up, ms"]
-    return table(["method", "", *head], rows)
+    head = [QUANTITIES[key].short for key in study.quantities]
+    return table(["method", "", *head, "ms a simulated second", "set-up, ms"], rows)
 
 
 def scene_page(name: str) -> str:

@@ -22,31 +22,11 @@ from percussion_model.verification.accuracy.ladders import LADDERS
 from percussion_model.verification.accuracy.orders import AT_LEAST, AT_MOST, Cost
 from percussion_model.verification.accuracy.problems import (
     APERIODIC,
-    CONTACT_HISTORY,
     HISTORIES,
-    HISTORY,
     QUANTITIES,
-    STRESS_HISTORY,
 )
 from percussion_model.verification.accuracy.references import Bar, Reference
 from percussion_model.verification.accuracy.study import WANTED, Point, Study
-
-SHORT = {
-    "rate_of_penetration": "rate",
-    "blow_period": "period",
-    "impact_velocity": "impact",
-    "rebound_velocity": "rebound",
-    "rock_energy": "energy",
-    "rock_share": "rock share",
-    "loss_share": "loss share",
-    "peak_bit_force": "bit peak",
-    "peak_contact_force": "contact peak",
-    "peak_stress": "stress peak",
-    "resting_place": "rest",
-    HISTORY: "bit history",
-    CONTACT_HISTORY: "contact history",
-    STRESS_HISTORY: "stress history",
-}
 
 ABOUT_BOUNDS = (
     "≤ and ≥: a bound, of a method that meets the error with its coarsest setting, or misses it "
@@ -139,7 +119,7 @@ def _error(found: Study, point: Point, key: str) -> str:
 def _show_points(found: Study) -> None:
     what = "Relative standard error" if found.kind == APERIODIC else "Relative error"
     keys = found.quantities
-    headings = ("ms/s", "±, %", "set-up", *(SHORT[key] for key in keys))
+    headings = ("ms/s", "±, %", "set-up", *(QUANTITIES[key].short for key in keys))
     table = _table("method", *(heading.replace(" ", "\n") for heading in headings))
     for name in found.names:
         table.add_row(f"[bold]{LADDERS[name].title}[/bold]")
@@ -165,7 +145,7 @@ def _show_orders(found: Study) -> None:
             "bar of the reference."
         )
         return
-    table = _table("method", *(SHORT[key].replace(" ", "\n") for key in keys))
+    table = _table("method", *(QUANTITIES[key].short.replace(" ", "\n") for key in keys))
     for name in found.names:
         orders = [found.order(name, key) for key in keys]
         cells = ["-" if one is None else str(one).replace(" ", "") for one in orders]

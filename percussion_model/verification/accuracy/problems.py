@@ -51,6 +51,7 @@ class Quantity:
 
     key: str
     label: str
+    short: str  # for the head of a column
     factor: float
     unit: str
 
@@ -58,20 +59,24 @@ class Quantity:
 QUANTITIES = {
     one.key: one
     for one in (
-        Quantity(RATE, "rate of penetration", 1e3, "mm/s"),
-        Quantity("blow_period", "blow period", 1e3, "ms"),
-        Quantity("impact_velocity", "impact velocity", 1.0, "m/s"),
-        Quantity("rebound_velocity", "rebound velocity", 1.0, "m/s"),
-        Quantity("peak_bit_force", "peak bit force", 1e-3, "kN"),
-        Quantity("peak_contact_force", "peak contact force (10 µs means)", 1e-3, "kN"),
-        Quantity("peak_stress", "peak stress, mid-bit", 1e-6, "MPa"),
-        Quantity("rock_energy", "energy into rock, a blow", 1.0, "J"),
-        Quantity("rock_share", "rock's share of the blow energy", 1.0, ""),
-        Quantity("loss_share", "share of the blow energy lost", 1.0, ""),
-        Quantity("resting_place", "resting place of the bit's end, from its start", 1e3, "mm"),
-        Quantity(HISTORY, "bit force through a blow", 1.0, ""),
-        Quantity(CONTACT_HISTORY, "contact force through a blow", 1.0, ""),
-        Quantity(STRESS_HISTORY, "stress, mid-bit, through a blow", 1.0, ""),
+        Quantity(RATE, "rate of penetration", "rate", 1e3, "mm/s"),
+        Quantity("blow_period", "blow period", "period", 1e3, "ms"),
+        Quantity("impact_velocity", "impact velocity", "impact", 1.0, "m/s"),
+        Quantity("rebound_velocity", "rebound velocity", "rebound", 1.0, "m/s"),
+        Quantity("peak_bit_force", "peak bit force", "bit peak", 1e-3, "kN"),
+        Quantity(
+            "peak_contact_force", "peak contact force (10 µs means)", "contact peak", 1e-3, "kN"
+        ),
+        Quantity("peak_stress", "peak stress, mid-bit", "stress peak", 1e-6, "MPa"),
+        Quantity("rock_energy", "energy into rock, a blow", "energy", 1.0, "J"),
+        Quantity("rock_share", "rock's share of the blow energy", "rock share", 1.0, ""),
+        Quantity("loss_share", "share of the blow energy lost", "loss share", 1.0, ""),
+        Quantity(
+            "resting_place", "resting place of the bit's end, from its start", "rest", 1e3, "mm"
+        ),
+        Quantity(HISTORY, "bit force through a blow", "bit history", 1.0, ""),
+        Quantity(CONTACT_HISTORY, "contact force through a blow", "contact history", 1.0, ""),
+        Quantity(STRESS_HISTORY, "stress, mid-bit, through a blow", "stress history", 1.0, ""),
     )
 }
 
