@@ -150,19 +150,9 @@ def run(extra: list[str]) -> int:
     return code or call([tool("percussion"), *REFERENCE_RUN, *extra])
 
 
-def fmu(extra: list[str]) -> int:
-    """Bake a scene into an FMU; paths count from where the user is."""
-    return setup() or call([tool("percussion"), "fmu", *extra], folder=Path.cwd())
-
-
-def native(extra: list[str]) -> int:
-    """Bake a scene into FMUs that need no Python; paths count from where the user is."""
-    return setup() or call([tool("percussion"), "native", *extra], folder=Path.cwd())
-
-
-def system(extra: list[str]) -> int:
-    """Build systems of FMUs, or list them; paths count from where the user is."""
-    return setup() or call([tool("percussion"), "system", *extra], folder=Path.cwd())
+def percussion(command: str, extra: list[str]) -> int:
+    """Run a command of `percussion`; paths count from where the user is."""
+    return setup() or call([tool("percussion"), command, *extra], folder=Path.cwd())
 
 
 def docs(extra: list[str]) -> int:
@@ -293,8 +283,9 @@ def main(arguments: list[str]) -> int:
             print(f".venv is {'up to date' if code == 0 else 'not ready'} "
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
-        work = {"run": run, "fmu": fmu, "native": native, "system": system, "docs": docs,
-                "test": test, "bench": bench, "wheels": wheels}  # fmt: skip
+        work = {"run": run, "docs": docs, "test": test, "bench": bench, "wheels": wheels}
+        if choice.command not in work:
+            return percussion(choice.command, extra)
         return work[choice.command](extra)
     except KeyboardInterrupt:
         print("\nInterrupted.", file=sys.stderr)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from fmpy import read_model_description
 
 from fmu_src.run import run_fmu
 from percussion_model.scene.writing import write_whole
+from percussion_model.simulation.files import csv_text
 
 DURATION = 0.5  # [s]
 STEP_SIZE = 1e-3  # [s]
@@ -24,19 +24,13 @@ def write_reference(path: Path) -> list[Path]:
     """
     variables = read_model_description(str(path)).modelVariables
     inputs = [one for one in variables if one.causality == "input"]
-    names = np.array([one.name for one in inputs])
-    starts = [1.0 if one.start == "true" else float(one.start) for one in inputs]
-    signals = np.array([[0.0, *starts], [DURATION, *starts]])
+    signals = {"time": [0.0, DURATION]}
+    for one in inputs:
+        signals[one.name] = [1.0 if one.start == "true" else float(one.start)] * 2
     result = run_fmu(path, stop_time=DURATION, step_size=STEP_SIZE, output_interval=STEP_SIZE)
-    inputs_file = path.with_name(f"{path.stem}_in.csv")
-    reference_file = path.with_name(f"{path.stem}_ref.csv")
-    _write(inputs_file, ["time", *names], signals)
-    table = np.array([[float(value) for value in row] for row in result])
-    _write(reference_file, list(result.dtype.names), table)
-    return [inputs_file, reference_file]
-
-
-def _write(path: Path, names: list[str], table: np.ndarray) -> None:
-    header = ",".join(f'"{name}"' for name in names)
-    lines = [header, *(",".join(repr(float(value)) for value in row) for row in table)]
-    write_whole(path, "\n".join(lines) + "\n")
+    found = {name: result[name].astype(float) for name in result.dtype.names}
+    files = []
+    for end, columns in (("in", signals), ("ref", found)):
+        files.append(path.with_name(f"{path.stem}_{end}.csv"))
+        write_whole(files[-1], csv_text(columns, quoted=True))
+    return files

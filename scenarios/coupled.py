@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +16,7 @@ from percussion_model.coupling import CoupledRun, Coupling, CouplingError
 from percussion_model.interface.messages import wrapped
 from percussion_model.interface.progress import progress, progress_bar
 from percussion_model.interface.tables import print_table
-from percussion_model.simulation.files import staged_texts
+from percussion_model.simulation.files import csv_text, staged_texts
 from percussion_model.simulation.uncertain import in_digits
 
 from .drawing import in_style, stacked
@@ -130,10 +129,7 @@ def save_runs(runs: Mapping[str, CoupledRun], name: str, folder: Path) -> list[P
 
 def save_table(columns: Mapping[str, np.ndarray], path: Path) -> Path:
     """Write columns as CSV."""
-    text = io.StringIO()
-    np.savetxt(text, np.column_stack(list(columns.values())), delimiter=",",
-               header=",".join(columns), comments="")  # fmt: skip
-    return staged_texts(path.parent, {path.name: text.getvalue()})[0]
+    return staged_texts(path.parent, {path.name: csv_text(columns)})[0]
 
 
 def write(

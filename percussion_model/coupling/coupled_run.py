@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from percussion_model.coupling.verdict import LIMITS, STIFFNESS, Verdict, judge_run
-from percussion_model.simulation.files import staged_file
+from percussion_model.simulation.files import csv_text, staged_file
 from percussion_model.simulation.rate import LEAST_BLOWS, has_stalled, ratio_of_sums
 from percussion_model.simulation.uncertain import is_undecided
 
@@ -89,10 +89,7 @@ class CoupledRun:
 
     def write_csv(self, path: Path) -> Path:
         """Write time and signals as CSV, with all digits."""
-        lines = [",".join(f'"{name}"' for name in self.columns)]
-        for row in zip(*(column.tolist() for column in self.columns.values()), strict=True):
-            lines.append(",".join(repr(value) for value in row))
-        staged_file(path, "\n".join(lines) + "\n")
+        staged_file(path, csv_text(self.columns, quoted=True))
         return path
 
 

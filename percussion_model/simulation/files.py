@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import os
@@ -196,6 +197,18 @@ def plain(value: Any) -> Any:
 def damaged(path: Path, why: str) -> ResultError:
     """What is said of a file that is cut off, or holds something else."""
     return ResultError(f"{path}: not a complete result: {shortened(why)}")
+
+
+def csv_text(columns: Mapping[str, Any], quoted: bool = False) -> str:
+    """Columns as CSV with all digits, what is None empty; texts in quotation marks if asked for."""
+    plain = [one.tolist() if isinstance(one, np.ndarray) else one for one in columns.values()]
+    text = io.StringIO()
+    writer = csv.writer(
+        text, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC if quoted else csv.QUOTE_MINIMAL
+    )
+    writer.writerow(columns)
+    writer.writerows(zip(*plain, strict=True))
+    return text.getvalue()
 
 
 def read_csv(path: Path, convert: Callable[[str], float]) -> dict[str, Sequence[float]]:

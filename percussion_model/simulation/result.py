@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Callable
@@ -22,6 +21,7 @@ from percussion_model.simulation.files import (
     LARGEST_TABLE,
     LARGEST_TEXT,
     ResultError,
+    csv_text,
     damaged,
     load_arrays,
     plain,
@@ -412,8 +412,10 @@ def _write_result(result: Result, folder: Path) -> list[Path]:
         (draft / "summary.json").write_text(to_json(result.summary()) + "\n", encoding="utf-8")
         (draft / "scene.toml").write_text(result.scene.to_toml(), encoding="utf-8")
         blows = result.blows
-        _write_csv(draft / "blows.csv", {name: blows[name] for name in BLOW.names or ()})
-        _write_csv(draft / "events.csv", _event_columns(result.events))
+        tables = {"blows": {name: blows[name] for name in BLOW.names or ()}}
+        tables["events"] = _event_columns(result.events)
+        for name, columns in tables.items():
+            (draft / f"{name}.csv").write_bytes(csv_text(columns).encode())
         if result.trace is not None:
             _write_trace(draft, result.trace)
         names = sorted(path.name for path in draft.iterdir())
@@ -428,19 +430,10 @@ def _event_columns(events: np.ndarray) -> dict[str, Any]:
 
 def _write_trace(draft: Path, trace: dict[str, np.ndarray]) -> None:
     if len(trace["time"]) <= LONGEST_CSV:
-        _write_csv(draft / "trace.csv", trace)
+        (draft / "trace.csv").write_bytes(csv_text(trace).encode())
     else:
         arrays: dict[str, Any] = dict(trace)
         np.savez_compressed(draft / "trace.npz", **arrays)
-
-
-def _write_csv(path: Path, columns: dict[str, Any]) -> None:
-    """Write columns with a heading; numbers keep all their digits."""
-    plain = [c.tolist() if isinstance(c, np.ndarray) else c for c in columns.values()]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*plain, strict=True))
 
 
 def _read_result(folder: Path) -> dict[str, Any]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, fields
+from dataclasses import fields
 
+from percussion_model.simulation.files import csv_text
 from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import in_digits, with_short_error
 from percussion_model.verification.measured.comparison import (
@@ -194,12 +193,8 @@ def reasons(found: Comparison) -> dict[str, list[str]]:
 
 def as_csv(found: Comparison) -> str:
     """All rows, SI units."""
-    text = io.StringIO()
     names = [one.name for one in fields(Row)]
-    writer = csv.DictWriter(text, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(row) for row in found.rows)
-    return text.getvalue()
+    return csv_text({name: [getattr(row, name) for row in found.rows] for name in names})
 
 
 def markdown(found: Comparison) -> Iterator[str]:

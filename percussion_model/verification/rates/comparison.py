@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from percussion_model.components.breaking import THRESHOLD
 from percussion_model.scene.rocks.breaking import energy_by_strength
+from percussion_model.simulation.files import plain
 from percussion_model.verification.rates.cases import DOWN, TOP, Case, Crater, Stored, stored_cases
 from percussion_model.verification.rates.criteria import (
     Verdict,
@@ -75,23 +75,24 @@ class Rates:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units; None is what is not defined."""
-        return {
-            "rows": [
-                {**_plain(r.case), "rate": r.case.rate, "predicted": _plain(r.predicted),
-                 "ratio": r.ratio}
-                for r in self.rows
-            ],
-            "verdicts": {
-                name: [_plain(one) for one in rows] for name, rows in self.verdicts.items()
-            },
-            "beside": {
-                name: {key: _finite(one) for key, one in values.items()}
-                for name, values in self.beside().items()
-            },
-            "unused": list(self.stored.unused),
-            "wanted": list(self.stored.wanted),
-            "craters": [_plain(one) for one in self.stored.craters],
-        }  # fmt: skip
+        rows = [
+            {**asdict(r.case), "rate": r.case.rate, "predicted": asdict(r.predicted),
+             "ratio": r.ratio}
+            for r in self.rows
+        ]  # fmt: skip
+        found: dict[str, Any] = plain(
+            {
+                "rows": rows,
+                "verdicts": {
+                    name: [asdict(one) for one in rows] for name, rows in self.verdicts.items()
+                },
+                "beside": self.beside(),
+                "unused": self.stored.unused,
+                "wanted": self.stored.wanted,
+                "craters": [asdict(one) for one in self.stored.craters],
+            }
+        )
+        return found
 
 
 def _beside(rows: Sequence[RateRow]) -> dict[str, float]:
@@ -109,14 +110,6 @@ def _beside(rows: Sequence[RateRow]) -> dict[str, float]:
         "mean_without_threshold": geometric_mean(free),
         "scatter_without_threshold": scatter(free),
     }
-
-
-def _plain(one: Any) -> dict[str, Any]:
-    return {key: _finite(value) for key, value in asdict(one).items()}
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def crater_verdicts(craters: Sequence[Crater]) -> list[Verdict]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator
+from operator import attrgetter
 
+from percussion_model.simulation.files import csv_text
 from percussion_model.simulation.markdown import table
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.verification.rates.cases import TOP, Case
@@ -26,6 +26,15 @@ BESIDE = {
     "scatter of power by area alone": "energy_alone",
     "mean without threshold": "mean_without_threshold",
     "scatter without threshold": "scatter_without_threshold",
+}
+# Columns of the CSV file, but for the source.
+IN_CSV = {
+    "case": "case.id",
+    **{name: f"case.{name}" for name in ("type", "rock", "site", "strength", "bit")},
+    "measured": "case.rate",
+    "predicted": "predicted.rate",
+    **{name: f"predicted.{name}" for name in ("numerical_error", "low", "high")},
+    "ratio": "ratio",
 }
 OF_WORDS = ("case", "rock", "hammer", *OF_VERDICTS)
 NOTES = (
@@ -94,20 +103,8 @@ def summary(found: Rates) -> str:
 
 def as_csv(found: Rates) -> str:
     """All cases, SI units."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ("case", "type", "rock", "site", "strength", "bit", "measured", "predicted",
-         "numerical_error", "low", "high", "ratio", "source")
-    )  # fmt: skip
-    for row in found.rows:
-        case, told = row.case, row.predicted
-        writer.writerow(
-            (case.id, case.type, case.rock, case.site, case.strength, case.bit, case.rate,
-             told.rate, told.numerical_error, told.low, told.high, row.ratio,
-             case.source["published"])
-        )  # fmt: skip
-    return text.getvalue()
+    columns = {name: list(map(attrgetter(of), found.rows)) for name, of in IN_CSV.items()}
+    return csv_text(columns | {"source": [row.case.source["published"] for row in found.rows]})
 
 
 def verdicts(found: Rates) -> Iterator[str]:
