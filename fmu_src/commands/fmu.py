@@ -47,7 +47,7 @@ def fmu(
         path = write_hammer(scene, output, platforms, force, scene_option, rock, flat_names, bit)
         if no_reference:
             return
-        from fmu_src.reference import write_reference
+        from fmu_src.run import write_reference
         from percussion_model.interface.progress import progress
 
         with progress("running the FMU; the first run compiles"):

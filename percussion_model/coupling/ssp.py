@@ -14,7 +14,12 @@ from urllib.request import url2pathname
 
 from percussion_model.coupling.component import CouplingError, naming
 from percussion_model.coupling.ssp_units import Unit, unit_named, units_of
-from percussion_model.coupling.ssp_values import Value, bound_values
+from percussion_model.coupling.ssp_values import (
+    Transformation,
+    Value,
+    bound_values,
+    transformation_of,
+)
 from percussion_model.coupling.ssp_xml import (
     InvalidError,
     Reader,
@@ -23,7 +28,6 @@ from percussion_model.coupling.ssp_xml import (
     within,
     word_of,
 )
-from percussion_model.coupling.transformation import Transformation, transformation_of
 from percussion_model.coupling.unpack import LONGEST_NAME, Allowance, unpack_zip
 from percussion_model.scene.rows import shortened
 

@@ -16,8 +16,7 @@ from percussion_model.coupling.component import (
 )
 from percussion_model.coupling.ssp import SYSTEM, Archive, Connection, Connector, signal_name
 from percussion_model.coupling.ssp_units import Unit, conversion, unit_named, units_of_fmu
-from percussion_model.coupling.ssp_values import Value
-from percussion_model.coupling.transformation import Change, Transformation, chained
+from percussion_model.coupling.ssp_values import Change, Transformation, Value, chained
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.units import UnitError
 

@@ -19,7 +19,7 @@ from fmu_src.archive import ROOT
 from fmu_src.hammer.motion import Gauge, Motion
 from fmu_src.hammer.outputs import OUTPUTS
 from fmu_src.hammer.variables import gauge_bars
-from fmu_src.native.compare import fmu_outputs, package_outputs
+from fmu_src.native.build import fmu_outputs, package_outputs
 from percussion_model import Scene
 from percussion_model.scene.numbers import section_numbers
 from percussion_model.solvers.cells import find_cell

@@ -21,7 +21,7 @@ import fmu_src.native.library as native
 from fmu_src.archive import MODEL
 from fmu_src.hammer.build import build_hammer
 from fmu_src.hammer.outputs import OUTPUTS
-from fmu_src.native.compare import STEP, STEPS, fmu_outputs, package_outputs
+from fmu_src.native.build import STEP, STEPS, fmu_outputs, package_outputs
 from fmu_src.slave.native import library_name, this_platform
 from percussion_model import Scene
 from percussion_model.coupling import CouplingError
