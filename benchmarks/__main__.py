@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +39,6 @@ ONE_THREAD = (
 
 # Simulated times of the reference scene with and without leaps.
 LEAPING_DURATION, STEPPING_DURATION = 4.0, 2.0
-
-# Some five blows.
-MOTION_DURATION = 0.25
-
-# Rounds of short stretches in which a step in flight is measured, a repetition.
-FLIGHT_ROUNDS = 5
 
 
 def measure(scene: Any, duration: float) -> dict[str, Any]:
@@ -91,43 +85,6 @@ def reference(repeats: int) -> list[dict[str, Any]]:
     return rows
 
 
-def effects(repeats: int) -> list[dict[str, Any]]:
-    """Cost of a wave step with one effect off, in flight and in the whole motion."""
-    from percussion_model import Scene
-    from percussion_model.analysis.effect_study import NOISE, effect_variants, step_costs
-
-    base = Scene.from_toml(REFERENCE).computed_by("wave", **{"solver.cells": 20})
-    cases = {}
-    for variant in effect_variants(base):
-        scene = variant.apply(base)
-        if scene.solver_name == "wave" and variant.effect != "leaps":
-            cases[variant.name] = (variant, scene)
-    scenes = [scene for _, scene in cases.values()]
-    flights = step_costs(scenes, FLIGHT_ROUNDS * repeats)
-    # Turn by turn, so that a machine that slows down slows all of them.
-    motions: dict[str, list[dict[str, Any]]] = {name: [] for name in cases}
-    for _ in range(repeats):
-        for name, (_, scene) in cases.items():
-            motions[name].append(measure(scene, MOTION_DURATION))
-    return [
-        {
-            "name": name,
-            "flight_step": flight,
-            "dearer": bool(variant.off and flight > NOISE * flights[0]),
-            "motion_step": best_step(motions[name]),
-            "motion_cost": min(run["cost"] for run in motions[name]),
-            "motion_steps": motions[name][0]["steps"],
-            "motion_events": motions[name][0]["events"],
-        }
-        for (name, (variant, _)), flight in zip(cases.items(), flights, strict=True)
-    ]
-
-
-def best_step(runs: list[dict[str, Any]]) -> float:
-    """Cost of a step [s]: noise only adds, so the least is the measure."""
-    return float(min(run["cost"] / run["steps"] for run in runs))
-
-
 def rigid(repeats: int) -> dict[str, Any]:
     """Cost of a blow of the rigid option."""
     from percussion_model import Scene
@@ -148,7 +105,9 @@ def elements(repeats: int) -> dict[str, Any]:
     scene = Scene.from_toml(REFERENCE).computed_by("fem")
     runs = [measure(scene, STEPPING_DURATION) for _ in range(repeats)]
     factor = statistics.median(STEPPING_DURATION / run["cost"] for run in runs)
-    return {"real_time_factor": factor, "step": best_step(runs)}
+    # noise only adds, so the least is the measure of a step
+    step = min(run["cost"] / run["steps"] for run in runs)
+    return {"real_time_factor": factor, "step": step}
 
 
 def command_line(repeats: int) -> dict[str, Any]:
@@ -169,7 +128,7 @@ def show(found: dict[str, Any]) -> None:
     """Print the figures as tables."""
     from rich.console import Console
 
-    from percussion_model.interface.tables import named_table, print_table
+    from percussion_model.interface.tables import airy_table, named_table, print_table
     from percussion_model.simulation.uncertain import rate_text
 
     console = Console()
@@ -182,8 +141,10 @@ def show(found: dict[str, Any]) -> None:
         console.print(f"[yellow]The machine was busy: load {computer['load_before']:.1f}.[/yellow]")
 
     headings = ("solver", "cells", "leaps", "times real time", "range", "rate mm/s", "period ms")
-    rows = [
-        (
+    title = "Reference scene: simulated time by time to compute"
+    table = airy_table(headings, headings[:1], title=title, title_justify="left")
+    for row in found["reference"]:
+        table.add_row(
             row["solver"],
             f"{row['cells']}",
             "on" if row["leaps"] else "off",
@@ -192,22 +153,7 @@ def show(found: dict[str, Any]) -> None:
             rate_text(row),
             f"{1e3 * row['blow_period']:.4f}",
         )
-        for row in found["reference"]
-    ]
-    show_table("Reference scene: simulated time by time to compute", headings, rows)
-    headings = ("scene", "in flight ns", "in motion ns", "0.25 s in ms", "steps", "events")
-    rows = [
-        (
-            row["name"] + (" [red]dearer[/red]" if row["dearer"] else ""),
-            f"{1e9 * row['flight_step']:.0f}",
-            f"{1e9 * row['motion_step']:.0f}",
-            f"{1e3 * row['motion_cost']:.1f}",
-            f"{row['motion_steps']}",
-            f"{row['motion_events']}",
-        )
-        for row in found["effects"]
-    ]
-    show_table("A wave step, 20 of them in the piston", headings, rows)
+    print_table(table)
     fem, start = found["elements"], found["command_line"]
     shown = f"{fem['real_time_factor']:.2f} times real time, {1e6 * fem['step']:.2f} µs a step"
     rows = [
@@ -218,16 +164,6 @@ def show(found: dict[str, Any]) -> None:
         ("Command line, 0.1 s simulated: later starts", f"{start['second']:.2f} s"),
     ]
     print_table(named_table(rows))
-
-
-def show_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table, its first column of names."""
-    from percussion_model.interface.tables import airy_table, print_table
-
-    table = airy_table(headings, headings[:1], title=title, title_justify="left")
-    for row in rows:
-        table.add_row(*row)
-    print_table(table)
 
 
 def compiled_in() -> float:
@@ -251,7 +187,6 @@ def bench(quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
     found["compilation"] = compiled_in()
     for name, text, measured, repeats, fewer in (
         ("reference", "reference scene", reference, 9, 3),
-        ("effects", "effects", effects, 11, 3),
         ("rigid", "rigid option", rigid, 7, 3),
         ("elements", "finite elements", elements, 7, 3),
         ("fmu", "FMU", fmu, 5, 1),
