@@ -18,6 +18,7 @@ class Unit:
     displays: dict[str, float]
 
 
+# Those that others are products of, and those with a display; what is met besides comes to them.
 UNITS: dict[str, Unit] = {
     "1": Unit({}, {"%": 100.0}),
     "m": Unit({"m": 1}, {"mm": 1e3}),
@@ -25,29 +26,15 @@ UNITS: dict[str, Unit] = {
     "s": Unit({"s": 1}, {"ms": 1e3, "us": 1e6}),
     "Hz": Unit({"s": -1}, {"1/min": 60.0}),
     "m/s": Unit({"m": 1, "s": -1}, {"mm/s": 1e3, "m/h": 3600.0}),
-    "m/s2": Unit({"m": 1, "s": -2}, {}),
     "N": Unit({"kg": 1, "m": 1, "s": -2}, {"kN": 1e-3}),
-    "N.s": Unit({"kg": 1, "m": 1, "s": -1}, {}),
     "N/m": Unit({"kg": 1, "s": -2}, {"kN/mm": 1e-6}),
-    "N.s/m": Unit({"kg": 1, "s": -1}, {}),
     "J": Unit({"kg": 1, "m": 2, "s": -2}, {}),
     "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"bar": 1e-5, "MPa": 1e-6}),
-    "kg/m3": Unit({"kg": 1, "m": -3}, {}),
     "kg": Unit({"kg": 1}, {}),
-    "m.s": Unit({"m": 1, "s": 1}, {}),
     "K": Unit({"K": 1}, {}),
     "rad": Unit({"rad": 1}, {}),
     "rad/s": Unit({"rad": 1, "s": -1}, {"rpm": 9.549296585513721}),
     "W": Unit({"kg": 1, "m": 2, "s": -3}, {}),
-    "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {}),
-    "N/s": Unit({"kg": 1, "m": 1, "s": -3}, {}),
-    "N.s/m2": Unit({"kg": 1, "m": -1, "s": -1}, {}),
-    "Pa/s": Unit({"kg": 1, "m": -1, "s": -3}, {}),
-    "Pa/N": Unit({"m": -2}, {}),
-    "Pa.s/m3": Unit({"kg": 1, "m": -4, "s": -1}, {}),
-    "m3": Unit({"m": 3}, {}),
-    "m3/s": Unit({"m": 3, "s": -1}, {}),
-    "m3/(s.Pa)": Unit({"kg": -1, "m": 4, "s": 1}, {}),
 }
 
 # A symbol and its exponent, as in m3.
@@ -89,12 +76,11 @@ def _exponents(name: str) -> dict[str, int]:
 
 
 def write_units(names: set[str]) -> Element:
-    """UnitDefinitions with the units of these names, in the order of UNITS."""
+    """UnitDefinitions with the units of these names."""
     root = Element("UnitDefinitions")
-    for name, unit in UNITS.items():
-        if name in names:
-            node = SubElement(root, "Unit", {"name": name})
-            SubElement(node, "BaseUnit", {base: str(power) for base, power in unit.base.items()})
-            for display, factor in unit.displays.items():
-                SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
+    for name in sorted(map(fmi_unit, names)):
+        node, unit = SubElement(root, "Unit", {"name": name}), UNITS[name]
+        SubElement(node, "BaseUnit", {base: str(power) for base, power in unit.base.items()})
+        for display, factor in unit.displays.items():
+            SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
     return root

@@ -14,7 +14,7 @@ from fmpy import read_model_description
 from fmu_src.archive import write_archive
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
-from fmu_src.units import UNITS
+from fmu_src.units import UNITS, fmi_unit
 from percussion_model.coupling.component import CouplingError, number_of_word
 from percussion_model.coupling.ssp import FMU
 from percussion_model.coupling.ssp_xml import SPACES, tag
@@ -292,7 +292,7 @@ def _annotate(system: Element, step: float) -> None:
 def _units(root: Element, names: set[str]) -> None:
     node = _add(root, "ssd", "Units")
     for name in sorted(names):
-        base = {key: str(power) for key, power in UNITS[name].base.items()}
+        base = {key: str(power) for key, power in UNITS[fmi_unit(name)].base.items()}
         _add(_add(node, "ssc", "Unit", name=name), "ssc", "BaseUnit", **base)
 
 
