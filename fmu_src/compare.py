@@ -25,14 +25,14 @@ from percussion_model.simulation.uncertain import rate_text
 DEFAULT = Path("dist") / "PercussiveHammer.fmu"
 STEP_SIZE = 0.01  # of the communication [s]
 
-# Label, factor and unit for print, output of the FMU, column of the blow table.
+# Label with its unit, factor for print, output of the FMU, column of the blow table.
 ROWS = (
-    ("start of the last blow", 1.0, "s", "blow_time", "time"),
-    ("depth at its start", 1e3, "mm", "blow_position", "bit_position"),
-    ("penetration", 1e3, "mm", "penetration_per_blow", "hole_advance"),
-    ("impact velocity", 1.0, "m/s", "impact_velocity", "impact_velocity"),
-    ("blow energy", 1.0, "J", "blow_energy", "blow_energy"),
-    ("stroke", 1e3, "mm", "piston.stroke", "stroke"),
+    ("start of the last blow [s]", 1.0, "blow_time", "time"),
+    ("depth at its start [mm]", 1e3, "blow_position", "bit_position"),
+    ("penetration [mm]", 1e3, "penetration_per_blow", "hole_advance"),
+    ("impact velocity [m/s]", 1.0, "impact_velocity", "impact_velocity"),
+    ("blow energy [J]", 1.0, "blow_energy", "blow_energy"),
+    ("stroke [mm]", 1e3, "piston.stroke", "stroke"),
 )
 
 
@@ -64,39 +64,29 @@ def run_both(scene: Scene, path: Path) -> dict[str, Any]:
 
 def describe(both: dict[str, Any], settle: float) -> str:
     """Write the last blow, the rate after settling, and all differences as a table."""
-    fmu, library = both["fmu"], both["library"]
-    same = len(fmu) == len(library)
-    lines = [f"{'':24}{'FMU in fmpy':>16}{'library':>16}{'difference':>14}"]
-
-    def add(label: str, unit: str, a: float, b: float, difference: float) -> None:
-        lines.append(f"{f'{label} [{unit}]':24}{a:16.9g}{b:16.9g}{difference:14.2g}")
-
-    rates = [
-        _rate(table, time_name, advance, settle)
-        for table, time_name, advance in (
-            (fmu, "blow_time", "penetration_per_blow"),
-            (library, "time", "hole_advance"),
-        )
-    ]
-    a, b = (1e3 * rate for rate in rates)
-    add("rate of penetration", "mm/s", a, b, a - b)
-    for label, factor, unit, output, column in ROWS:
-        a, b = fmu[output], library[column]
-        worst = float(np.max(np.abs(a - b))) if same else float("nan")
-        add(label, unit, factor * a[-1], factor * b[-1], factor * worst)
+    fmu = {column: both["fmu"][output] for _, _, output, column in ROWS}
+    library, counts = both["library"], [len(both[name]) for name in ("fmu", "library")]
+    a, b = (1e3 * _rate(blows, settle) for blows in (fmu, library))
+    rows = [("rate of penetration [mm/s]", a, b, a - b)]
+    for label, factor, _, column in ROWS:
+        one, other = factor * fmu[column], factor * library[column]
+        worst = np.max(np.abs(one - other)) if counts[0] == counts[1] else np.nan
+        rows.append((label, one[-1], other[-1], worst))
+    lines = [f"{'':26}{'FMU in fmpy':>14}{'library':>16}{'difference':>14}"]
+    lines += [f"{label:26}{a:14.9g}{b:16.9g}{off:14.2g}" for label, a, b, off in rows]
     lines.append(
-        f"{len(fmu)} and {len(library)} whole blows; the difference is the greatest over all of "
+        f"{counts[0]} and {counts[1]} whole blows; the difference is the greatest over all of "
         f"them. FMU {both['seconds'][0]:.1f} s, library {both['seconds'][1]:.1f} s. "
         f"With the error of grid and scatter the rate is {both['rate']} mm/s."
     )
     return "\n".join(lines)
 
 
-def _rate(table: Any, time_name: str, advance: str, settle: float) -> float:
+def _rate(blows: Any, settle: float) -> float:
     """Advance of the hole by time from the first to the last blow start after settling [m/s]."""
-    counted = table[table[time_name] >= settle]
-    took = counted[time_name][-1] - counted[time_name][0]
-    return float(np.sum(counted[advance][:-1]) / took)
+    counted = blows["time"] >= settle
+    time = blows["time"][counted]
+    return float(np.sum(blows["hole_advance"][counted][:-1]) / (time[-1] - time[0]))
 
 
 def main() -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fmu_src.hammer.inputs import SAME
+from fmu_src.hammer.motion import PERIODS_HELD
 from fmu_src.native import kinds
 from percussion_model.engine.layout import (
     blow_records,
@@ -25,8 +26,6 @@ from percussion_model.scene.inputs import INPUTS
 
 # Inputs of the solver, in the order of INPUTS.
 COUNT = len(INPUTS)
-# A rate holds for this many periods after the last blow, then falls towards 0.
-PERIODS_HELD = 2.0
 # Flags of a step, as the shell has them (fmu_src/native/shell.h).
 NEW_INPUTS, STOP_AT_BLOW, SAME_STEP = 1, 2, 4
 NO_LIMIT = 1 << 30  # of blows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fmu_src.hammer.warnings import INTERVAL
 from fmu_src.native.messages import Note
 from fmu_src.native.motion import count_of, read
 from fmu_src.native.outputs import numerical, residual
@@ -20,8 +21,6 @@ from percussion_model.simulation.validity import (
     MOST_RESIDUAL,
 )
 
-# Time between two checks of a motion [s]; one costs as much as reading an output.
-INTERVAL = 0.1
 # Rows of notes, as the shell has them (fmu_src/native/shell.h); the first is for a fault.
 ROW, ROWS = 8, 32
 TIME = 6  # place of the fact that tells when
