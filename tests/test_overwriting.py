@@ -82,19 +82,6 @@ def test_the_same_run_replaces_its_own_result(percussion):
     assert found["files"] == ["blows.csv", "events.csv", "scene.toml", "summary.json"]
 
 
-def test_numbers_that_an_earlier_version_wrote_as_text_are_the_same(percussion):
-    assert percussion(*RUN, "--no-figures", "--out", "x")[0] == 0
-    file = Path("x", ORIGIN)
-    tree = json.loads(file.read_text())
-    del tree["version"]
-    tree["made_by"] = {
-        key: repr(value) if isinstance(value, float) else value
-        for key, value in tree["made_by"].items()
-    }
-    file.write_text(json.dumps(tree))
-    assert percussion(*RUN, "--no-figures", "--out", "x")[0] == 0
-
-
 def test_plot_does_not_draw_over_another_run(percussion):
     """The folder that it chooses itself is numbered; the same run's own is taken."""
     assert percussion(*RUN, "--out", "out/rigid")[0] == 0
@@ -221,17 +208,15 @@ def test_forcing_removes_nothing_outside_of_the_folder(tmp_path):
 
 
 def test_what_another_command_left_is_named_as_it_is_typed(tmp_path):
-    """Of examples earlier versions kept the name alone."""
     typed = {
         "run": "percussion run",
         "python -m scenarios.rod_addition": "python -m scenarios.rod_addition",
-        "examples.rate_map": "python -m examples.rate_map",
     }
     for command, words in typed.items():
         Claim(tmp_path, {"command": command}, force=True).sign()
         with pytest.raises(ResultError, match=f"holds the result of `{words}`"):
             Claim(tmp_path, {"command": "couple"})
-    assert Claim(tmp_path, {"command": "python -m examples.rate_map"}).folder == tmp_path
+    assert Claim(tmp_path, {"command": command}).folder == tmp_path
 
 
 @pytest.mark.parametrize("text", ["[]", '{"made_by": 3, "files": []}', '{"made_by": {}}', "{"])

@@ -283,14 +283,12 @@ def test_what_cannot_be_written_is_said_before(rigid, tmp_path):
             rigid.save(folder)
 
 
-def test_an_older_blow_table_tells_no_rate_and_says_so(rigid, tmp_path):
+def test_a_blow_table_without_a_column_is_refused(rigid, tmp_path):
     rigid.save(tmp_path)
     table = rigid.to_pandas().drop(columns=["hole_depth", "hole_advance"])
     table.to_csv(tmp_path / "blows.csv", index=False, na_rep="nan")
-    loaded = Result.load(tmp_path)
-    assert loaded.summary()["rate_of_penetration"] is None
-    assert "run the scene again" in loaded.warnings[-1]
-    np.testing.assert_array_equal(loaded.blows["penetration"], rigid.blows["penetration"])
+    with pytest.raises(ResultError, match="not a complete result: has no column hole_advance"):
+        Result.load(tmp_path)
 
 
 def test_what_is_no_result_is_refused(tmp_path):

@@ -129,7 +129,6 @@ def _other_than(folder: Path, origin: Mapping[str, Any]) -> str:
     found = _read(folder)[0]
     if not found:
         return f"holds files of unknown origin ({ORIGIN} cannot be read)"
-    origin = {key: _number(value) for key, value in origin.items()}
     if found == origin:
         return ""
     if found.get("command") != origin.get("command"):
@@ -175,21 +174,7 @@ def _read(folder: Path) -> tuple[dict[str, Any], list[str]]:
         return {}, []
     if not isinstance(origin, dict) or not isinstance(files, list):
         return {}, []
-    # earlier versions wrote numbers as text, and names of examples alone
-    origin = {key: _number(value) for key, value in origin.items()}
-    if str(command := origin.get("command")).startswith("examples."):
-        origin["command"] = f"{PYTHON}{command}"
     return origin, [name for name in files if isinstance(name, str)]
-
-
-def _number(value: Any) -> Any:
-    """The number that a text is the `repr` of; anything else as it is."""
-    try:
-        number = float(value) if isinstance(value, str) else value
-    except ValueError:
-        return value
-    is_number = isinstance(value, str) and math.isfinite(number) and repr(number) == value
-    return number if is_number else value
 
 
 def _times(folder: Path) -> dict[str, int]:

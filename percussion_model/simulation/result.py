@@ -451,9 +451,6 @@ def _read_result(folder: Path) -> dict[str, Any]:
     scene = _read_scene(folder / "scene.toml")
     summary, fields = _read_summary(folder / "summary.json")
     blows = read_csv(folder / "blows.csv", float)
-    if not set(blows) >= _HOLE:
-        fields["warnings"].append(_NO_HOLE)
-        blows |= dict.fromkeys(_HOLE, [math.nan] * len(next(iter(blows.values()))))
     tables = {"blows": rows_of(folder / "blows.csv", blows, BLOW)}
     count = summary.get("blows")
     if count is not None and count != len(tables["blows"]):
@@ -484,16 +481,16 @@ def _read_summary(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         raise damaged(path, "no table of names and values")
     fields = {}
     for name, (kind, allowed) in _FROM_SUMMARY.items():
-        if name not in summary and name not in _LATER:
+        if name not in summary:
             raise damaged(path, f"has no {name}")
-        fields[name] = value = summary.get(name, _LATER.get(name))
+        fields[name] = value = summary[name]
         if not kind(value):
             raise damaged(path, f"{name} = {shortened(repr(value))}: must be {allowed}")
     for name in ("energy", "end", "errors", "cells"):
         given = fields[name] or {}
         fields[name] = {key: math.nan if one is None else one for key, one in given.items()}
     for name in _RATES:
-        value = summary.get(name)  # unknown to older files
+        value = summary.get(name)
         fields[name] = math.nan if value is None else value
     return summary, fields
 
@@ -530,17 +527,9 @@ _FROM_SUMMARY: dict[str, tuple[Callable[[Any], bool], str]] = {
     "errors": _NUMBERS,
     "interrupted": (lambda value: isinstance(value, bool), "true or false"),
 }
-# What summaries of older versions do not have.
-_LATER: dict[str, Any] = {"end": {}, "errors": {}, "interrupted": False}
 # Parameters that stand last in a scene which is written, and always.
 _LAST = ("duration", "settle")
 _RATES = ("rate_of_penetration_relative_error", "rate_of_penetration_fixed_window")
-# Columns that the blow tables of older files do not have, and what is said then.
-_HOLE = {"hole_depth", "hole_advance"}
-_NO_HOLE = (
-    "saved before results had the depth of the hole: the rate of penetration is undefined; "
-    "run the scene again"
-)
 
 
 def _number_or_kind(text: str) -> float:
