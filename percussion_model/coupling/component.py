@@ -16,8 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import platform, read_model_description, sharedLibraryExtension
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy import calloc, free, platform, read_model_description, sharedLibraryExtension
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
 from lxml import etree
 
 from percussion_model.scene.retired import remark
@@ -272,6 +278,10 @@ class Component:
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = self._logger
+        # the functions of C themselves: some FMUs call them in each step
+        allocate, release = (ctypes.cast(one, ctypes.c_void_p).value for one in (calloc, free))
+        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(allocate)
+        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(release)
         self.slave: Any = None
         try:
             with contextlib.chdir("."):  # fmpy stays in the folder of a library that fails

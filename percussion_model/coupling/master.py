@@ -31,7 +31,7 @@ from percussion_model.coupling.port import (
 )
 from percussion_model.coupling.python_part import Given, PythonPart, input_starts
 from percussion_model.coupling.rejection import StepControl
-from percussion_model.coupling.ssp import unpack
+from percussion_model.coupling.ssp import place_of, unpack
 from percussion_model.coupling.unpack import Allowance, check_xml, new_folder, unpack_zip
 from percussion_model.coupling.verdict import Jumps
 from percussion_model.coupling.wiring import Wiring
@@ -133,7 +133,7 @@ class Coupling:
                 self.parts[name] = Component(name, folders[name], description)
         self._parameters = values
         for signal, value in given.items():  # before those of the archive
-            component, _, variable = signal.partition(".")
+            component, variable = place_of(signal, values)
             if component not in values:
                 raise CouplingError(f"{signal}: there is no FMU {component} in {self.path.name}")
             values[component][variable] = value
@@ -277,7 +277,7 @@ class Coupling:
                 if link.output not in taken[link.source]:
                     taken[link.source].append(link.output)
         for signal in signals:
-            name, _, output = signal.partition(".")
+            name, output = place_of(signal, self.parts)
             if name not in self.parts:
                 raise CouplingError(f"{signal}: there is no component {name}")
             if output not in taken[name] + kept[name]:

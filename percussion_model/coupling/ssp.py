@@ -6,6 +6,7 @@ Whatever SSP 1.0 can say is applied, changes no number, or is refused here (docs
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,16 +35,23 @@ from percussion_model.scene.rows import shortened
 STRUCTURE = "SystemStructure.ssd"
 MOST_PARTS = 100
 FMU = "application/x-fmu-sharedlibrary"
-# The element whose connectors are those of the system itself.
+# The outermost system, as an element. Elements in systems within it have the names of these
+# before their own, with dots between.
 SYSTEM = ""
+# Element and connector.
+Place = tuple[str, str]
 
 
 class Connector(NamedTuple):
-    """What an archive says of a variable: its causality, and type and unit where it has them."""
+    """What an archive says of a variable: its causality, and type and unit where it has them.
+
+    Numbers of an enumeration by their words stand in `items`, if the archive has them.
+    """
 
     kind: str
     type: str | None
     unit: Unit | None
+    items: dict[str, int]
 
 
 class Connection(NamedTuple):
@@ -51,6 +59,8 @@ class Connection(NamedTuple):
 
     Attributes
     ----------
+    system : str
+        In which it stands.
     ends : tuple
         Element and connector of both.
     transformation : Transformation or None
@@ -58,7 +68,8 @@ class Connection(NamedTuple):
         Whether no unit is converted.
     """
 
-    ends: tuple[tuple[str, str], tuple[str, str]]
+    system: str
+    ends: tuple[Place, Place]
     transformation: Transformation | None
     keeps_unit: bool
 
@@ -75,8 +86,10 @@ class Archive:
     ----------
     sources : dict of Path
         FMU by component, in the order of the archive.
+    systems : list of str
+        Elements that are systems, outer before inner ones.
     values : dict of dict
-        What the archive sets, by component, that of the whole system under `SYSTEM`.
+        What the archive sets, by component and by system.
     connections : list of Connection
     connectors : dict of Connector
         By element and name.
@@ -85,16 +98,30 @@ class Archive:
     """
 
     sources: dict[str, Path]
+    systems: list[str]
     values: dict[str, dict[str, Value]]
     connections: list[Connection]
-    connectors: dict[tuple[str, str], Connector]
+    connectors: dict[Place, Connector]
     start: float | None
     stop: float | None
 
 
 def signal_name(element: str, name: str) -> str:
-    """How a variable of a component, or a connector of the system, is called."""
+    """How a variable of a component, or what stands in a system, is called."""
     return f"{element}.{name}" if element else name
+
+
+def name_within(element: str, name: str) -> str | None:
+    """Name within an element of what has this name outside of it; None of what is elsewhere."""
+    inner = name.removeprefix(signal_name(element, ""))
+    return inner if inner != name or element == SYSTEM else None
+
+
+def place_of(signal: str, components: Iterable[str]) -> Place:
+    """Component and variable of a signal; names of components may have dots, too."""
+    found = [one for one in components if name_within(one, signal) is not None]
+    component = max(found, key=len, default=signal.partition(".")[0])
+    return component, name_within(component, signal) or ""
 
 
 def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
@@ -126,49 +153,53 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
 def _read(path: Path, reader: Reader) -> Archive:
     root = reader.structure(STRUCTURE)
     (system,) = elements(root, "ssd:System")
-    components = _components(system)
+    named = {SYSTEM: system}
+    _find_elements(SYSTEM, named)
+    systems = [name for name, node in named.items() if word_of(node) == "System"]
+    components = {name: node for name, node in named.items() if word_of(node) != "System"}
+    for word, count, least in (("components", len(components), 1), ("systems", len(systems), 0)):
+        if not least <= count <= MOST_PARTS:
+            raise CouplingError(f"has {count} {word}, not {least} to {MOST_PARTS}")
     units = units_of(root, "ssd:Units/ssc:Unit")
-    named = {SYSTEM: system} | components
     return Archive(
-        {name: _source_of(node, reader, path) for name, node in components.items()},
+        {name: _source_of(name, node, reader, path) for name, node in components.items()},
+        systems,
         {name: _values_of(name, node, reader, units) for name, node in named.items()},
-        [_connection(one) for one in elements(system, "ssd:Connections/ssd:Connection")],
-        _connectors(named, units),
+        [one for name in systems for one in _connections(name, named[name])],
+        _connectors(named, units, _enumerations(root)),
         _time_of(root, "startTime"),
         _time_of(root, "stopTime"),
     )
 
 
-def _components(system: Any) -> dict[str, Any]:
-    """Elements of the components by name; other elements, and other components, are refused."""
-    found: dict[str, Any] = {}
-    for node in elements(system, "ssd:Elements/*"):
-        name = node.get("name")
-        if not (name.isprintable() and len(name) <= LONGEST_NAME):
+def _find_elements(system: str, named: dict[str, Any]) -> None:
+    """Add the elements within a system to those that are named; what is not read is refused."""
+    for node in elements(named[system], "ssd:Elements/*"):
+        name, word = signal_name(system, node.get("name")), word_of(node).lower()
+        if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
             raise CouplingError(
-                f"component {shortened(name)!r}: must have 1 to {LONGEST_NAME} characters that "
-                "can be printed"
+                f"{word} {shortened(name)!r}: must have 1 to {LONGEST_NAME} characters that can "
+                "be printed"
             )
-        if word_of(node) != "Component":
+        if word not in ("component", "system"):
             raise CouplingError(
-                f"{word_of(node)} {shortened(name)}: a system within the system, or a reference "
-                "to signals, is not computed: connect its components directly"
+                f"{word_of(node)} {shortened(name)}: signals of a dictionary are not computed: "
+                "connect the components directly"
             )
-        if name in found:
-            raise CouplingError(f"has two components {name}")
+        if name in named:
+            raise CouplingError(f"has two {word}s {name}")
         for key, allowed in (("type", (FMU,)), ("implementation", ("any", "CoSimulation"))):
             if node.get(key, allowed[0]) not in allowed:
                 raise CouplingError(
                     f"component {name}: {key} = {shortened(node.get(key))}: must be "
                     f"{' or '.join(allowed)}"
                 )
-        found[name] = node
-    if not 0 < len(found) <= MOST_PARTS:
-        raise CouplingError(f"has {len(found)} components, not 1 to {MOST_PARTS}")
-    return found
+        named[name] = node
+        if word == "system":
+            _find_elements(name, named)
 
 
-def _source_of(component: Any, reader: Reader, path: Path) -> Path:
+def _source_of(name: str, component: Any, reader: Reader, path: Path) -> Path:
     """File of a component's FMU; outside of the archive only where that is trusted."""
     source, trusted = component.get("source"), reader.allowance.trusted
     found = within(reader.folder, source)
@@ -183,20 +214,22 @@ def _source_of(component: Any, reader: Reader, path: Path) -> Path:
     if found is None:
         trust = "" if trusted else " (--trust allows others)"
         raise CouplingError(
-            f"component {component.get('name')}: source = {shortened(source)!r}: must be an FMU "
-            f"within the archive{trust}, no folder and no link"
+            f"component {name}: source = {shortened(source)!r}: must be an FMU within the "
+            f"archive{trust}, no folder and no link"
         )
     return found
 
 
 def _values_of(name: str, node: Any, reader: Reader, units: dict[str, Unit]) -> dict[str, Value]:
-    with naming(f"component {name}" if name else "system"):
+    with naming(f"{word_of(node).lower()} {name}".rstrip()):
         return bound_values(node, reader, units)
 
 
-def _connectors(named: dict[str, Any], units: dict[str, Unit]) -> dict[tuple[str, str], Connector]:
-    """Connectors of all components, and of the system."""
-    found: dict[tuple[str, str], Connector] = {}
+def _connectors(
+    named: dict[str, Any], units: dict[str, Unit], enumerations: dict[str, dict[str, int]]
+) -> dict[Place, Connector]:
+    """Connectors of all components and systems."""
+    found: dict[Place, Connector] = {}
     for element, node in named.items():
         for one in elements(node, "ssd:Connectors/ssd:Connector"):
             key = element, one.get("name")
@@ -205,17 +238,41 @@ def _connectors(named: dict[str, Any], units: dict[str, Unit]) -> dict[tuple[str
             types = elements(one, "ssc:*")  # geometry and annotations are of another space
             name = word_of(types[0]) if types else None
             unit = unit_named(types[0].get("unit"), units) if types else None
-            found[key] = Connector(one.get("kind"), name, unit)
+            items = enumerations.get(types[0].get("name"), {}) if types else {}
+            found[key] = Connector(one.get("kind"), name, unit, items)
     return found
 
 
-def _connection(node: Any) -> Connection:
-    ends = tuple(
-        (node.get(f"{end}Element", SYSTEM), node.get(f"{end}Connector")) for end in ("start", "end")
-    )
-    found = Connection(ends, None, is_true(node.get("suppressUnitConversion")))  # type: ignore[arg-type]
-    with naming(found):
-        return found._replace(transformation=transformation_of(node))
+def _enumerations(root: Any) -> dict[str, dict[str, int]]:
+    """Numbers by word of all enumerations of the structure, by name."""
+    return {
+        one.get("name"): {
+            item.get("name"): int(item.get("value")) for item in elements(one, "ssc:Item")
+        }
+        for one in elements(root, "ssd:Enumerations/ssc:Enumeration")
+    }
+
+
+def _connections(system: str, node: Any) -> Iterator[Connection]:
+    """Connections within a system, each of what stands directly in it."""
+    inside = [one.get("name") for one in elements(node, "ssd:Elements/*")]
+    known = {*inside, None}
+    for one in elements(node, "ssd:Connections/ssd:Connection"):
+        ends: list[Place] = []
+        unknown: set[Any] = set()
+        for end in ("start", "end"):
+            # OMSimulator leaves it empty where it means the system
+            element = one.get(f"{end}Element") or None
+            name = system if element is None else signal_name(system, element)
+            ends.append((name, one.get(f"{end}Connector")))
+            unknown = unknown or ({element} - known)
+        keeps_unit = is_true(one.get("suppressUnitConversion"))
+        found = Connection(system, (ends[0], ends[1]), None, keeps_unit)
+        with naming(found):
+            for name in unknown:
+                told = shortened(", ".join(inside))
+                raise CouplingError(f"there is no component {shortened(name)}, only {told}")
+            yield found._replace(transformation=transformation_of(one))
 
 
 def _time_of(root: Any, key: str) -> float | None:

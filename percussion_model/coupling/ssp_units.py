@@ -136,7 +136,8 @@ def _factor_and_shift(given: Unit, wanted: Unit) -> tuple[float, float]:
 def _text(unit: Unit) -> str:
     """A unit in words that `scene.units` reads."""
     if unit.powers is None:
-        return unit.name.replace(".", "*")  # as FMI writes products
+        # as FMI writes products, and others all units
+        return unit.name.removeprefix("[").removesuffix("]").replace(".", "*")
     if any(unit.powers[BASES.index("A") :]):
         raise UnitError
     powers = zip(BASES, unit.powers, strict=True)

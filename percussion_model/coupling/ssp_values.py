@@ -174,6 +174,8 @@ def _mapped(values: dict[str, Value], node: Any) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for one in elements(node, "ssm:MappingEntry"):
         source, target = one.get("source"), one.get("target")
+        if not source:
+            continue  # a form that was not filled in
         if target in found:
             raise CouplingError(f"mapping to {shortened(target)}: there are two")
         if source not in values:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from percussion_model.coupling.component import (
@@ -14,7 +15,16 @@ from percussion_model.coupling.component import (
     number_of_word,
     numbers_of_words,
 )
-from percussion_model.coupling.ssp import SYSTEM, Archive, Connection, Connector, signal_name
+from percussion_model.coupling.ssp import (
+    SYSTEM,
+    Archive,
+    Connection,
+    Connector,
+    Place,
+    name_within,
+    place_of,
+    signal_name,
+)
 from percussion_model.coupling.ssp_units import Unit, conversion, unit_named, units_of_fmu
 from percussion_model.coupling.ssp_values import Change, Transformation, Value, chained
 from percussion_model.scene.rows import shortened
@@ -29,7 +39,8 @@ _TO = {
 _FROM = _TO | {"Linear": ("Real", "Integer")}
 # Types whose numbers are right without one.
 _ALIKE = (("Integer", "Real"), ("Integer", "Enumeration"), ("Enumeration", "Integer"))
-_SETTABLE = ("input", "parameter")
+# Kinds of connectors.
+_SETTABLE, _GIVING = ("input", "parameter"), ("output", "calculatedParameter")
 
 
 class Link(NamedTuple):
@@ -78,57 +89,127 @@ class Wiring:
             for name, found in descriptions.items()
         }
         self._units = {name: units_of_fmu(found) for name, found in descriptions.items()}
+        # by the place to which a connection leads: the connection, and where it comes from
+        self._feeds: dict[Place, tuple[Connection, Place]] = {}
+        self._led: dict[Place, list[Place]] = {}  # the same from there on
+        for one in archive.connections:
+            with naming(one):
+                source, sink = self._direction(one)
+            if sink in self._feeds:
+                raise CouplingError(f"{shortened(signal_name(*sink))} has two connections")
+            self._feeds[sink] = one, source
+            self._led.setdefault(source, []).append(sink)
 
     def values(self) -> dict[str, dict[str, Any]]:
-        """Values to be set, by component; those of the system go before others."""
+        """Values to be set, by component; those of a system go before what is within it."""
         found: dict[str, dict[str, Any]] = {name: {} for name in self._variables}
         for name in self._variables:
             for variable, value in self.archive.values[name].items():
                 if variable in self._variables[name] or name not in self.replaced:
                     end = self._end(name, variable)
                     found[name][variable] = self._fitted(value, end)
-        for name, value in self.archive.values[SYSTEM].items():
-            for end, own in self._targets(name, value):
-                found[end.component][end.name] = own
+        for system in reversed(self.archive.systems):
+            for name, value in self.archive.values[system].items():
+                for (component, variable), own in self._targets(system, name, value):
+                    found[component][variable] = own
         return found
 
     def links(self) -> dict[str, list[Link]]:
-        """Inputs of each component that are connected."""
+        """Inputs of each component that are connected to outputs, within systems or across them."""
         found: dict[str, list[Link]] = {name: [] for name in self._variables}
-        fed: set[tuple[str, str]] = set()
-        for one in self.archive.connections:
-            with naming(one):
-                ends = [self._end(*end) for end in one.ends if self._is_inside(*end)]
-                sinks = [end for end in ends if end.variable.causality == "input"]
-                if len(ends) == 2:
-                    sources = [end for end in ends if end.variable.causality == "output"]
-                    if not (sources and sinks):
-                        kinds = " and ".join(end.variable.causality for end in ends)
-                        raise CouplingError(f"must be of an output and an input, not of {kinds}")
-                    (source,), (sink,) = sources, sinks
-                    change = _change(source, sink, one)
-                    link = Link(sink.name, source.component, source.name, change)
-                    found[sink.component].append(link)
-            for end in sinks:
-                if end[:2] in fed:
-                    name = signal_name(end.component, end.name)
-                    raise CouplingError(f"{shortened(name)} has two connections")
-                fed.add(end[:2])
+        for place in self._feeds:
+            if place[0] in found:
+                source, way = self._way_to(place)
+                if source[0] in found:  # else nothing outside the outermost system feeds it
+                    found[place[0]].append(self._link(source, way))
         return found
 
-    def _is_inside(self, element: str, name: str) -> bool:
-        """Whether an end is of a component. Those of the system move nothing in a run: nothing
-        is outside, and what is bound to them is among the values.
-        """
-        if element == SYSTEM and (SYSTEM, name) not in self.archive.connectors:
-            raise CouplingError(f"the system has no connector {shortened(name)}")
-        return element != SYSTEM
+    def _direction(self, connection: Connection) -> tuple[Place, Place]:
+        """Where a connection comes from, and where it leads."""
+        kinds, sources = [], []
+        for end in connection.ends:
+            kinds.append(self._kind(end))
+            # within a system its inputs give what those of its elements take
+            if kinds[-1] in (_SETTABLE if end[0] == connection.system else _GIVING):
+                sources.append(end)
+        sinks = [one for one in connection.ends if one not in sources]
+        if len(sources) == 1 and {*kinds} <= {*_SETTABLE, *_GIVING}:
+            given, taken = (kinds[connection.ends.index(one)] for one in (*sources, *sinks))
+            # nothing outside the outermost system changes what its inputs have at the start
+            is_value = given == "parameter" or sources[0][0] == SYSTEM
+            if taken != "parameter" or is_value:
+                return sources[0], sinks[0]
+        raise CouplingError(f"must be of an output and an input, not of {' and '.join(kinds)}")
+
+    def _kind(self, place: Place) -> str:
+        """Causality of a variable of a component, or of a connector of a system."""
+        element, name = place
+        if element in self._variables:
+            return str(self._end(element, name).variable.causality)
+        if place not in self.archive.connectors:
+            raise CouplingError(f"the system{element and ' '}{element} has no connector {name}")
+        return self.archive.connectors[place].kind
+
+    def _way_to(self, sink: Place) -> tuple[Place, list[Place]]:
+        """What feeds an input in the end, and all to which connections lead on the way."""
+        way = [sink]
+        while True:
+            connection, source = self._feeds[way[0]]
+            if source not in self._feeds:
+                return source, way
+            if source in way:
+                raise CouplingError(f"{connection}: leads back to itself")
+            way.insert(0, source)
+
+    def _ways_from(self, place: Place, before: tuple[Place, ...] = ()) -> Iterator[list[Place]]:
+        """All to which connections lead on the ways from a connector of a system to components."""
+        if place in before:
+            raise CouplingError(f"connector {signal_name(*place)}: leads back to itself")
+        for sink in self._led.get(place, ()):
+            way = (*before, place)
+            if sink[0] in self._variables:
+                yield [*way, sink]
+            else:
+                yield from self._ways_from(sink, way)
+
+    def _units_on(self, way: list[Place], unit: Unit | None) -> list[Unit | None]:
+        """Units on a way that begins in one; an input of a system has that to which it leads."""
+        units = [self._end(*way[-1]).unit]
+        for place in reversed(way[:-1]):
+            said = self.archive.connectors[place]
+            units.insert(0, said.unit or (units[0] if said.kind in _SETTABLE else None))
+        for k, known in enumerate(units[:-1]):
+            units[k] = unit = known or unit
+        return units
+
+    def _link(self, source: Place, way: list[Place]) -> Link:
+        """Link of a component's input, with what all connections on the way change."""
+        begin, sink, change = self._end(*source), self._end(*way[-1]), None
+        is_difference = begin.is_difference or sink.is_difference
+        for place, unit in zip(way, self._units_on(way, begin.unit), strict=True):
+            connection, end = self._feeds[place][0], sink
+            if place != way[-1]:
+                end = self._between(place, unit, begin.variable, is_difference)
+            with naming(connection):
+                change = chained(change, _change(begin, end, connection))
+            begin = end
+        return Link(sink.name, *source, change)
+
+    def _between(self, place: Place, unit: Unit | None, before: Any, is_difference: bool) -> End:
+        """A connector of a system as a variable; what it does not say is as before it."""
+        said = self.archive.connectors[place]
+        items = [
+            SimpleNamespace(name=word, value=number)
+            for word, number in (said.items or numbers_of_words(before)).items()
+        ]
+        variable = SimpleNamespace(
+            name=place[1], type=said.type or before.type, unit=None,
+            relativeQuantity=is_difference, declaredType=SimpleNamespace(items=items),
+        )  # fmt: skip
+        return End(*place, variable, unit)
 
     def _end(self, component: str, name: str) -> End:
         """A variable of a component, as FMU and archive describe it."""
-        if component not in self._variables:
-            known = shortened(", ".join(self._variables))
-            raise CouplingError(f"there is no component {shortened(component)}, only {known}")
         variable = find_variable(component, self._variables[component], name)
         units = self._units[component]
         unit = unit_named(variable.unit or getattr(variable.declaredType, "unit", None), units)
@@ -139,53 +220,51 @@ class Wiring:
             _check_connector(signal_name(component, name), said, variable, unit)
         return End(component, name, variable, unit or said.unit)
 
-    def _targets(self, name: str, value: Value) -> Iterator[tuple[End, Any]]:
-        """What a value that is bound to the system sets."""
-        connector = self.archive.connectors.get((SYSTEM, name))
-        ends = []
-        if connector is not None:
-            if connector.kind not in _SETTABLE:
-                raise CouplingError(
-                    f"parameter {shortened(name)}: is an {connector.kind} of the system: must be "
-                    f"{' or '.join(_SETTABLE)}"
-                )
-            for one in self.archive.connections:
-                if (SYSTEM, name) in one.ends:
-                    other = one.ends[one.ends[0] == (SYSTEM, name)]
-                    if other[0] == SYSTEM:
-                        continue
-                    with naming(one):
-                        end = self._end(*other)
-                        ends.append((end, self._passed(value, connector, end, one)))
+    def _targets(self, system: str, name: str, value: Value) -> Iterator[tuple[Place, Any]]:
+        """What a value that is bound to a system sets."""
+        full, is_known = signal_name(system, name), False
+        for inner in self.archive.systems:
+            place = inner, name_within(inner, full) or ""
+            if inner != system and name_within(system, inner) is None:
+                continue
+            if place in self.archive.connectors:
+                is_known, kind = True, self._kind(place)
+                if kind not in _SETTABLE:
+                    raise CouplingError(
+                        f"parameter {shortened(full)}: is an {kind} of the system: must be "
+                        f"{' or '.join(_SETTABLE)}"
+                    )
+                for way in self._ways_from(place):
+                    yield way[-1], self._passed(value, way)
         for component, variables in self._variables.items():
-            own = name.removeprefix(f"{component}.")
-            if own != name and own in variables:
-                end = self._end(component, own)
-                ends.append((end, self._fitted(value, end)))
-        if not ends:
-            self._refuse_name(name)
-        yield from ends
+            own = name_within(component, full) or ""
+            if own in variables and name_within(system, component) is not None:
+                is_known = True
+                yield (component, own), self._fitted(value, self._end(component, own))
+        if not is_known:
+            self._refuse_name(full)
 
     def _refuse_name(self, name: str) -> None:
-        """`CouplingError` for a value of the system that sets nothing."""
-        for component, variables in self._variables.items():
-            if name.startswith(f"{component}.") and component not in self.replaced:
-                find_variable(component, variables, name.removeprefix(f"{component}."))
-        if name.partition(".")[0] not in self.replaced:
-            raise CouplingError(
-                f"parameter {shortened(name)}: sets nothing: must be COMPONENT.VARIABLE or a "
-                "connected input or parameter of the system"
-            )
+        """`CouplingError` for a value of a system that sets nothing."""
+        component, own = place_of(name, self._variables)
+        if component in self.replaced:
+            return
+        if component in self._variables:
+            find_variable(component, self._variables[component], own)
+        raise CouplingError(
+            f"parameter {shortened(name)}: sets nothing: must be COMPONENT.VARIABLE or an input "
+            "or parameter of the system"
+        )
 
-    def _passed(self, value: Value, connector: Connector, end: End, connection: Connection) -> Any:
-        """A value as a variable takes it that is connected to a connector of the system.
-
-        A connector without a unit has that of the variable.
-        """
-        unit = connector.unit or end.unit
-        inner = _changed(value, unit, end.is_difference)
-        outer = Value(value.kind, inner, unit, connection.transformation, connection.keeps_unit)
-        return self._fitted(outer, end)
+    def _passed(self, value: Value, way: list[Place]) -> Any:
+        """A value as a variable takes it to which connections lead from a connector."""
+        end, units = self._end(*way[-1]), self._units_on(way, None)
+        for place, unit in zip(way[1:], units, strict=False):
+            one, _ = self._feeds[place]
+            with naming(one):
+                inner = _changed(value, unit, end.is_difference)
+            value = Value(value.kind, inner, unit, one.transformation, one.keeps_unit)
+        return self._fitted(value, end)
 
     def _fitted(self, value: Value, end: End) -> Any:
         """A value as a variable takes it."""
