@@ -252,8 +252,7 @@ class CompiledStep:
 
 
 def can_compile(ports: Sequence[Port]) -> bool:
-    """Whether all parts are FMUs, with nothing on the way, and there is what compiles."""
+    """Whether all are FMUs of FMI 2.0, with nothing on the way, and there is what compiles."""
     return find_spec("numba") is not None and all(
-        isinstance(port.part, Component) and port.on_way is None and not port.converts
-        for port in ports
+        type(port.part) is Component and port.on_way is None and not port.converts for port in ports
     )

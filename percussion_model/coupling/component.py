@@ -34,10 +34,13 @@ _PLACE = re.compile(r"\.([0-9]{1,4})(?=\.|$)")
 _COUNTED = re.compile(r"\.[0-9]|\[[0-9]")
 # What fmpy calls the types that share a getter, and what their values are in C.
 FAMILIES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
-ORDER = ("Real", "Integer", "Boolean")
 _IN_C: dict[str, tuple[Any, str]] = {
     "Real": (ctypes.c_double, "d"), "Integer": (ctypes.c_int, "i"), "Boolean": (ctypes.c_int, "i"),
 }  # fmt: skip
+# What types of FMI 3.0 are in FMI 2.0 and SSP 1.0.
+KINDS = {"Float64": "Real", "Float32": "Real"} | {
+    f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)
+}
 # Integers of FMI are below this, by size.
 LARGEST = 2.0**31
 # The highest status of a call that did what it should.
@@ -61,7 +64,7 @@ def naming(place: object) -> Iterator[None]:
 
 
 def read_description(name: str, folder: str) -> Any:
-    """Model description of an unpacked FMU for co-simulation, FMI 2.0.
+    """Model description of an unpacked FMU for co-simulation, FMI 2.0 or 3.0.
 
     Parameters
     ----------
@@ -73,10 +76,18 @@ def read_description(name: str, folder: str) -> Any:
     except Exception as error:  # fmpy has no errors of its own
         text = shortened(" ".join(str(error).split()))
         raise CouplingError(f"{name}: modelDescription.xml cannot be read: {text}") from error
-    if found.fmiVersion != "2.0" or found.coSimulation is None:
-        raise CouplingError(f"{name}: this FMU has no co-simulation by FMI 2.0")
-    _mark_differences(found, Path(folder) / "modelDescription.xml")
+    if found.fmiVersion not in ("2.0", "3.0") or found.coSimulation is None:
+        raise CouplingError(f"{name}: this FMU has no co-simulation by FMI 2.0 or 3.0")
+    if found.fmiVersion == "2.0":
+        _mark_differences(found, Path(folder) / "modelDescription.xml")
     return found
+
+
+def kind_of(variable: Any) -> str:
+    """Type of a variable in the words of FMI 2.0 and SSP 1.0."""
+    if getattr(variable, "dimensions", None):
+        return "array"
+    return KINDS.get(variable.type, variable.type)
 
 
 def _mark_differences(description: Any, path: Path) -> None:
@@ -126,13 +137,15 @@ def number_of_word(component: str, variable: Any, word: str) -> int:
     return found[word]
 
 
-def check_library(name: str, folder: Path, identifier: str) -> None:
+def check_library(name: str, folder: Path, identifier: str, platform: str) -> None:
     """`CouplingError` unless an unpacked FMU has a whole library for this platform.
 
     Parameters
     ----------
     identifier : str
         Name of the library without its ending, which must be a C identifier.
+    platform : str
+        As the folders of its libraries are called.
     """
     if not (identifier.isascii() and identifier.isidentifier()):
         raise CouplingError(
@@ -176,19 +189,19 @@ class Group:
         references = [component.find(name).valueReference for name in names]
         self.family = family
         self.begin, self.end = begin, begin + len(names)  # places among all values
-        kind_in_c, letter = _IN_C[family]
+        kind_in_c, letter = component.IN_C[family]
         values = (kind_in_c * len(names))()
         packed = struct.Struct(f"{len(names)}{letter}")
+        self.is_real = kind_in_c in (ctypes.c_double, ctypes.c_float)
         self.fill = functools.partial(packed.pack_into, values, 0)
         self.found = functools.partial(packed.unpack_from, values)
-        self.name = f"fmi2{kind}{family}"
+        self.name = f"{component.PREFIX}{kind}{family}"
         self.call = component.function(self.name)
+        size = ctypes.c_size_t(len(names))
         self.arguments = (
-            component.pointer,
-            (ctypes.c_uint * len(names))(*references),
-            ctypes.c_size_t(len(names)),
-            values,
-        )
+            component.pointer, (ctypes.c_uint * len(names))(*references), size, values,
+            *component.further(size),
+        )  # fmt: skip
 
 
 class Exchange:
@@ -214,7 +227,7 @@ class Exchange:
         self.names: list[str] = []
         self.groups: list[Group] = []
         families = [component.family(name) for name in names]
-        for family in ORDER:
+        for family in component.IN_C:
             own = [name for name, of in zip(names, families, strict=True) if of == family]
             if own:
                 self.groups.append(Group(component, family, own, kind, len(self.names)))
@@ -240,8 +253,8 @@ class Exchange:
             if chosen == self._last[k]:
                 continue
             try:
-                group.fill(*(chosen if group.family == "Real" else map(int, chosen)))
-            except struct.error:
+                group.fill(*(chosen if group.is_real else map(int, chosen)))
+            except (struct.error, OverflowError):
                 self.component.refuse_large(self.names[group.begin : group.end], chosen)
                 raise
             self._call(group)
@@ -254,7 +267,7 @@ class Exchange:
 
 
 class Component:
-    """An instance of an FMU that is unpacked.
+    """An instance of an FMU of FMI 2.0 that is unpacked.
 
     Parameters
     ----------
@@ -266,14 +279,36 @@ class Component:
         Of `read_description`.
     """
 
+    # what another version of FMI has differently
+    PREFIX, PLATFORM, FAMILIES, IN_C = "fmi2", platform, FAMILIES, _IN_C
+    SLAVE = FMU2Slave
+
     def __init__(self, name: str, folder: str, description: Any) -> None:
         self.name = name
-        check_library(name, Path(folder), description.coSimulation.modelIdentifier)
+        identifier = description.coSimulation.modelIdentifier
+        check_library(name, Path(folder), identifier, self.PLATFORM)
         self.variables = {one.name: one for one in description.modelVariables}
         self.can_save = bool(description.coSimulation.canGetAndSetFMUstate)
         self.can_vary = bool(description.coSimulation.canHandleVariableCommunicationStepSize)
         self.messages: list[str] = []
         self.faults: list[str] = []  # those of them that are errors
+        self.slave: Any = None
+        try:
+            with contextlib.chdir("."):  # fmpy stays in the folder of a library that fails
+                self.slave = self.SLAVE(
+                    guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier,
+                    instanceName=name,
+                )  # fmt: skip
+        except Exception as error:  # fmpy has no errors of its own
+            text = str(error).rpartition(folder)[2].lstrip("/\\")
+            raise CouplingError(
+                f"{name}: the library of its FMU cannot be loaded: {text}"
+            ) from error
+        self._instantiate()
+        self.pointer = ctypes.c_void_p(self.slave.component)
+        self._no_rollback = 1  # promised to the FMU until a state is saved
+
+    def _instantiate(self) -> None:
         # both have to live as long as the instance
         self._logger = fmi2CallbackLoggerTYPE(self._note)
         self._callbacks = fmi2CallbackFunctions()
@@ -282,26 +317,14 @@ class Component:
         allocate, release = (ctypes.cast(one, ctypes.c_void_p).value for one in (calloc, free))
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(allocate)
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(release)
-        self.slave: Any = None
-        try:
-            with contextlib.chdir("."):  # fmpy stays in the folder of a library that fails
-                self.slave = FMU2Slave(
-                    guid=description.guid,
-                    unzipDirectory=folder,
-                    modelIdentifier=description.coSimulation.modelIdentifier,
-                    instanceName=name,
-                )
-        except Exception as error:  # fmpy has no errors of its own
-            text = str(error).rpartition(folder)[2].lstrip("/\\")
-            raise CouplingError(
-                f"{name}: the library of its FMU cannot be loaded: {text}"
-            ) from error
         self._guarded(self.slave.instantiate, callbacks=self._callbacks, loggingOn=True)
-        self.pointer = ctypes.c_void_p(self.slave.component)
         self.stepper = self.function(
             "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
         )
-        self._no_rollback = 1  # promised to the FMU until a state is saved
+
+    def further(self, size: Any) -> tuple[Any, ...]:
+        """What a getter or a setter takes after the values, of which there are `size`."""
+        return ()
 
     def function(self, name: str, *types: Any) -> Any:
         """A function of the library that returns a status; without types, by those of ctypes."""
@@ -321,29 +344,32 @@ class Component:
 
     def family(self, name: str) -> str:
         """Family of a variable by name: what its getter is called."""
-        kind = self.find(name).type
-        if kind not in FAMILIES:
+        one = self.find(name)
+        if kind_of(one) not in FAMILIES or one.type not in self.FAMILIES:
             raise CouplingError(
-                f"{self.name}.{name} is a {kind}: must be one of {', '.join(FAMILIES)}"
+                f"{self.name}.{name} is of type {kind_of(one)}: must be one of "
+                f"{', '.join(self.FAMILIES)}"
             )
-        return FAMILIES[kind]
+        return self.FAMILIES[one.type]
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set variables by name; enumerations by number or by word."""
         for name, value in values.items():
             one = self.find(name)
-            family = self.family(name)
+            self.family(name)
             if one.variability == "constant" or one.initial == "calculated":
                 raise CouplingError(f"{self.name}.{name} is calculated: it cannot be set")
+            if one.causality == "structuralParameter":
+                raise CouplingError(
+                    f"{self.name}.{name} is a structural parameter: it cannot be set"
+                )
             if isinstance(value, str):
                 value = number_of_word(self.name, one, value)
-            converted = self._converted(one, family, value)
-            setter = getattr(self.slave, f"set{family}")
-            self._guarded(setter, [one.valueReference], [converted])
+            self.writer([name]).write([self._converted(one, value)])
 
-    def _converted(self, one: Any, family: str, value: Any) -> Any:
+    def _converted(self, one: Any, value: Any) -> Any:
         """A value as its type; nothing is rounded, no number is taken for a Boolean."""
-        kind = {"Real": float, "Integer": int, "Boolean": bool}[family]
+        kind = {"Real": float, "Integer": int, "Boolean": bool}[FAMILIES[kind_of(one)]]
         try:
             converted = kind(value)
         except (ValueError, OverflowError, TypeError):
@@ -411,8 +437,9 @@ class Component:
     def refuse_large(self, names: Sequence[str], values: Sequence[Any]) -> None:
         """Raise the error of an Integer input that is to take a number beyond its range."""
         for name, value in zip(names, values, strict=True):
-            if FAMILIES[self.variables[name].type] != "Real" and not abs(value) < LARGEST:
-                raise CouplingError(f"{self.name}: {name} = {value!r} does not fit an Integer")
+            family = self.family(name)
+            if family != "Real" and not abs(value) < LARGEST:
+                raise CouplingError(f"{self.name}: {name} = {value!r} does not fit an {family}")
 
     def _error(self, text: str) -> CouplingError:
         # the line of the FMU itself comes first, that of its export library after it

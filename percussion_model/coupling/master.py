@@ -21,6 +21,7 @@ import numpy as np
 
 from percussion_model.coupling.compiled import CompiledStep, can_compile
 from percussion_model.coupling.component import Component, CouplingError, naming, read_description
+from percussion_model.coupling.component3 import Component3
 from percussion_model.coupling.coupled_run import JUDGED, CoupledRun, known_signals
 from percussion_model.coupling.port import (
     OnWay,
@@ -130,7 +131,8 @@ class Coupling:
                 starts = input_starts(name, description, values.pop(name))
                 self.parts[name] = PythonPart(name, chosen, starts)
             else:
-                self.parts[name] = Component(name, folders[name], description)
+                kind = {"2.0": Component, "3.0": Component3}[description.fmiVersion]
+                self.parts[name] = kind(name, folders[name], description)
         self._parameters = values
         for signal, value in given.items():  # before those of the archive
             component, variable = place_of(signal, values)

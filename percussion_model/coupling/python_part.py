@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.component import CouplingError, kind_of
 from percussion_model.coupling.fresh import fresh
 from percussion_model.coupling.ssp_xml import is_true
 from percussion_model.scene.rows import nearest, said_among
@@ -111,7 +111,7 @@ def input_starts(name: str, description: Any, values: Mapping[str, Any]) -> dict
         if one.causality == "input":
             try:
                 own = values.get(one.name)
-                found[one.name] = kinds.get(one.type, int)(one.start) if own is None else own
+                found[one.name] = kinds.get(kind_of(one), int)(one.start) if own is None else own
             except (TypeError, ValueError):
                 raise CouplingError(f"{name}: {one.name} has no start value") from None
     return found

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import fmpy
 from lxml import etree
 
-from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.component import KINDS, CouplingError
 from percussion_model.coupling.unpack import Allowance, check_xml, one_line
 from percussion_model.scene.rows import shortened, unprintable
 
@@ -25,9 +25,9 @@ SPACES = {
 }  # fmt: skip
 # Files besides the structure.
 MOST_FILES = 100
-# What 2.0 adds without changing a system, and its names of the types of FMI 2.0.
+# What 2.0 adds without changing a system, and what its names of types are in 1.0.
 _REMARKS = ("MetaData", "Signature")
-_SAME = {"Float64": "Real", "Int32": "Integer"}
+_SAME = KINDS
 _TRUE = ("true", "1")
 # What messages repeat.
 _TOLD = (

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from percussion_model.coupling.component import kind_of
 from percussion_model.coupling.port import Port
 from percussion_model.simulation.uncertain import in_digits
 
@@ -94,7 +95,7 @@ def _units(port: Port) -> dict[str, str]:
     """Unit of each real output that others take; those of a Python part are not known."""
     variables = getattr(port.part, "variables", {})
     found = {name: variables[name] for name in port.taken if name in variables}
-    return {name: one.unit or "" for name, one in found.items() if one.type == "Real"}
+    return {name: one.unit or "" for name, one in found.items() if kind_of(one) == "Real"}
 
 
 @dataclass(frozen=True)

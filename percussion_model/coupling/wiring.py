@@ -11,6 +11,7 @@ from percussion_model.coupling.component import (
     FAMILIES,
     CouplingError,
     find_variable,
+    kind_of,
     naming,
     number_of_word,
     numbers_of_words,
@@ -59,6 +60,11 @@ class End(NamedTuple):
     name: str
     variable: Any
     unit: Unit | None
+
+    @property
+    def type(self) -> str:
+        """Its type, in the words of FMI 2.0."""
+        return kind_of(self.variable)
 
     @property
     def is_difference(self) -> bool:
@@ -203,7 +209,7 @@ class Wiring:
             for word, number in (said.items or numbers_of_words(before)).items()
         ]
         variable = SimpleNamespace(
-            name=place[1], type=said.type or before.type, unit=None,
+            name=place[1], type=said.type or kind_of(before), unit=None,
             relativeQuantity=is_difference, declaredType=SimpleNamespace(items=items),
         )  # fmt: skip
         return End(*place, variable, unit)
@@ -270,14 +276,14 @@ class Wiring:
         """A value as a variable takes it."""
         with naming(shortened(signal_name(end.component, end.name))):
             found = _changed(value, end.unit, end.is_difference)
-        if isinstance(found, str) and end.variable.type in FAMILIES:
+        if isinstance(found, str) and end.type in FAMILIES:
             return number_of_word(end.component, end.variable, found)
         return found
 
 
 def _check_connector(name: str, said: Connector, variable: Any, unit: Unit | None) -> None:
     """`CouplingError` where a connector contradicts the variable of its FMU."""
-    own = variable.type
+    own = kind_of(variable)
     types = {own, "Integer"} if own == "Enumeration" else {own}
     for key, given, allowed in (
         ("kind", said.kind, {variable.causality}),
@@ -323,7 +329,7 @@ def _conversion(given: Unit | None, wanted: Unit | None, is_difference: bool) ->
 
 def _change(source: End, sink: End, connection: Connection) -> Change | None:
     """What a connection does to its values, None where they stay as they are."""
-    given, wanted = source.variable.type, sink.variable.type
+    given, wanted = source.type, sink.type
     transformation = connection.transformation
     if transformation is None:
         _check_types(source, sink)
@@ -343,7 +349,7 @@ def _change(source: End, sink: End, connection: Connection) -> Change | None:
 
 def _check_types(source: End, sink: End) -> None:
     """`CouplingError` where values would be rounded, or words change their meaning."""
-    given, wanted = source.variable.type, sink.variable.type
+    given, wanted = source.type, sink.type
     if given == wanted == "Enumeration":
         have, known = numbers_of_words(source.variable), numbers_of_words(sink.variable)
         if not have.items() <= known.items():

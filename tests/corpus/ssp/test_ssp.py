@@ -9,14 +9,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from fmpy import platform, sharedLibraryExtension
+from fmpy import platform, platform_tuple, sharedLibraryExtension
 
 from fmu_src.native.library import NoCompilerError, compiler_for
 from fmu_src.slave.native import this_platform
 from percussion_model.coupling import Coupling, CouplingError
 from percussion_model.coupling.python_part import input_starts
 from tests.commands import percussion
-from tests.properties.hostile import pack
+from tests.properties.hostile import pack, unpacked
 
 HERE = Path(__file__).parent
 CASES = tomllib.loads((HERE / "cases.toml").read_text(encoding="utf-8"))["case"]
@@ -53,24 +53,32 @@ WORKSHOP = {
 
 @pytest.fixture(scope="session")
 def echoes(tmp_path_factory):
-    """Both FMUs as bytes."""
+    """All FMUs as bytes, by name."""
     try:
         compiler = compiler_for(this_platform())
     except NoCompilerError as error:
         pytest.skip(str(error))
-    library = tmp_path_factory.mktemp("echo") / f"Echo{sharedLibraryExtension}"
-    words = [*compiler, "-shared", "-O1", "-fPIC", HERE / "echo.c", "-o", library]
-    subprocess.run([str(word) for word in words], check=True)
+    folder = tmp_path_factory.mktemp("echo")
+
+    def packed(name, text, place):
+        library = folder / f"{name}{sharedLibraryExtension}"
+        if not library.exists():
+            words = [*compiler, "-shared", "-O1", "-fPIC", HERE / f"{name}.c", "-o", library]
+            subprocess.run([str(word) for word in words], check=True)
+        entry = f"binaries/{place}/Echo{sharedLibraryExtension}"
+        return pack({"modelDescription.xml": text.encode(), entry: library.read_bytes()})
+
     text = (HERE / "echo.xml").read_text(encoding="utf-8")
     other = text
     for old, new in WORKSHOP.items():
         assert old in other
         other = other.replace(old, new)
-    entry = f"binaries/{platform}/{library.name}"
-    return [
-        pack({"modelDescription.xml": one.encode(), entry: library.read_bytes()})
-        for one in (text, other)
-    ]
+    newer = (HERE / "echo3.xml").read_text(encoding="utf-8")
+    return {
+        "Echo": packed("echo", text, platform),
+        "Workshop": packed("echo", other, platform),
+        "Echo3": packed("echo3", newer, platform_tuple),
+    }
 
 
 def write_case(case, echoes, path):
@@ -87,8 +95,8 @@ def write_case(case, echoes, path):
     for name, text in entries.items():
         for word, meaning in WORDS.items():
             text = text.replace(word, meaning)
-        entries[name] = echoes[0] if text == "ECHO" else text.encode()
-    entries |= {"resources/Echo.fmu": echoes[0], "resources/Workshop.fmu": echoes[1]}
+        entries[name] = echoes["Echo"] if text == "ECHO" else text.encode()
+    entries |= {f"resources/{name}.fmu": one for name, one in echoes.items()}
     path.write_bytes(pack(entries))
 
 
@@ -119,7 +127,7 @@ def write_named(name, echoes, path):
 def test_another_fmu_and_a_python_part_have_their_units(echoes, tmp_path):
     """Of b: the other FMU has SI itself, the Python part stands for that of the archive."""
     path = write_named("connection between units", echoes, tmp_path / "case.ssp")
-    (tmp_path / "Other.fmu").write_bytes(echoes[0])
+    (tmp_path / "Other.fmu").write_bytes(echoes["Echo"])
     run = Coupling(path, replaced={"b": tmp_path / "Other.fmu"}).run(2e-3, 1e-3, ["b.force_out"])
     assert run["b.force_out"][-1] == 2500.0
     seen = {}
@@ -151,6 +159,22 @@ def test_options_set_what_the_archive_does_too(echoes, tmp_path):
     assert run["b.force_out"][-1] == 1.5
     with pytest.raises(CouplingError, match=r"a\.force_out is calculated: it cannot be set"):
         Coupling(path, {"a.force_out": 1.0}).run(2e-3, 1e-3)
+    with pytest.raises(CouplingError, match="a: count = 4294967297 does not fit an Integer"):
+        Coupling(path, {"a.count": 2**32 + 1}).run(2e-3, 1e-3)
+
+
+def test_steps_of_fmi_3_are_taken_back(echoes, tmp_path):
+    """A tolerance saves and restores the state, and leaves it as it was."""
+    path = write_named("components of FMI 3.0", echoes, tmp_path / "case.ssp")
+    structure = unpacked(path.read_bytes())
+    words = structure["SystemStructure.ssd"].replace(b"Echo.fmu", b"Echo3.fmu")
+    text = words.replace(b"Workshop.fmu", b"Echo3.fmu")
+    path.write_bytes(pack(structure | {"SystemStructure.ssd": text}))
+    run = Coupling(path).run(4e-3, 1e-3, ["d.force_out", "d.clock_out"], tolerance=1e-3)
+    assert (run.error, run.steps) == ("", 8)
+    assert (run["d.force_out"][-1], run["d.clock_out"][-1]) == (6000.0, 4e-3)
+    run = Coupling(path, {"a.force": 2e6}).run(4e-3, 1e-3)
+    assert (run.error, run.steps) == ("at 0 s: a: asks for the end of the run", 0)
 
 
 @pytest.fixture
