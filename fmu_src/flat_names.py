@@ -7,6 +7,8 @@ and messages keep the names with dots.
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Iterable
 from xml.etree.ElementTree import Element
 
 _MARKS = re.compile(r"[.\[\]]+")
@@ -15,6 +17,21 @@ _MARKS = re.compile(r"[.\[\]]+")
 def flat_name(name: str) -> str:
     """The name with underscores for dots and brackets, as piston_sections_1_length."""
     return _MARKS.sub("_", name).strip("_")
+
+
+def flat_names(names: Iterable[str]) -> dict[str, str]:
+    """Flat names by names; where two would have the same, that with dots gets more underscores."""
+    plain = {name: flat_name(name) for name in names}
+    counts = Counter(plain.values())
+    return {
+        name: flat if name == flat or counts[flat] == 1 else wide_name(name)
+        for name, flat in plain.items()
+    }
+
+
+def wide_name(name: str) -> str:
+    """The name with two underscores for dots and brackets."""
+    return _MARKS.sub("__", name).strip("_")
 
 
 def flatten(root: Element) -> None:
@@ -27,9 +44,11 @@ def flatten(root: Element) -> None:
     """
     root.set("variableNamingConvention", "flat")
     seen: dict[str, str] = {}
-    for node in root.find("ModelVariables") or ():
+    nodes = list(root.find("ModelVariables") or ())
+    known = flat_names(node.attrib["name"] for node in nodes)
+    for node in nodes:
         name = node.attrib["name"]
-        flat = flat_name(name)
+        flat = known[name]
         if flat in seen:
             raise ValueError(f"{seen[flat]} and {name} would both be {flat}")
         seen[flat] = name

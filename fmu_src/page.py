@@ -7,7 +7,7 @@ from dataclasses import replace
 from html import escape
 
 from fmu_src.description import About
-from fmu_src.flat_names import flat_name
+from fmu_src.flat_names import flat_names
 from fmu_src.variables import Variable
 from percussion_model.scene.scene import Scene
 
@@ -68,7 +68,8 @@ def write_page(
         INTRODUCTION + needs if scene is not None else "",
     ]
     if about.flat:
-        variables = [replace(one, name=flat_name(one.name)) for one in variables]
+        known = flat_names(one.name for one in variables)
+        variables = [replace(one, name=known[one.name]) for one in variables]
     for causality in ("input", "output", "parameter"):
         rows = [variable for variable in variables if variable.causality == causality]
         if rows:

@@ -27,6 +27,7 @@ def system(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for all files.")
     ] = options.DIST,
+    flat_names: options.FlatNames = False,
     force: Annotated[bool, typer.Option("--force", help="Replace FMUs of other hammers.")] = False,
 ) -> int:
     """Build drilling systems of FMUs as SSP archives, and validate each FMU, or list them."""
@@ -35,7 +36,13 @@ def system(
 
         from fmu_src.archive import content, state_of
         from fmu_src.native.library import COMPILING, library_here
-        from fmu_src.system.archive import build_fmus, find_plan, plans, write_system
+        from fmu_src.system.archive import (
+            build_fmus,
+            find_plan,
+            plans,
+            with_flat_names,
+            write_system,
+        )
         from percussion_model.interface.progress import progress
 
         if not systems:
@@ -53,7 +60,7 @@ def system(
             with progress(text, share) as report:
                 if len(chosen) > 1:
                     report(f"{text} ({number + 1} of {len(chosen)})", share)
-                fmus = build_fmus(plan, output, force)
+                fmus = build_fmus(plan, output, force, flat_names)
             for fmu in fmus.values():
                 if fmu in checked:
                     continue
@@ -63,6 +70,7 @@ def system(
                 valid = "valid" if not found else "; ".join(found)
                 typer.echo(f"{fmu}: {state_of(fmu, before.get(fmu))}, {valid}")
                 problems += len(found)
+            plan = with_flat_names(plan, fmus) if flat_names else plan
             path = write_system(plan, fmus, output / f"{plan.name}.ssp")
             typer.echo(f"{path}: {state_of(path, before.get(path))}")
         return INVALID if problems else 0

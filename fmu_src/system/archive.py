@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
@@ -12,6 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 from fmpy import read_model_description
 
 from fmu_src.archive import write_archive
+from fmu_src.flat_names import flat_name, wide_name
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
 from fmu_src.parts.build import PARTS, build_part
 from fmu_src.units import UNITS, fmi_unit
@@ -26,6 +27,8 @@ from percussion_model.scene.text import read_toml
 
 SYSTEMS = scenario_folder() / "systems"
 HAMMER = "PercussiveHammer"
+# What names of files with flat names of variables have more.
+FLAT = "Flat"
 # Masters find the parameters of all components under one name.
 PARAMETER_SET = "initialValues"
 
@@ -146,21 +149,53 @@ def _beside(path: Path, name: str) -> Path | None:
     return file if file.is_file() else None
 
 
-def build_fmus(plan: SystemPlan, folder: Path, force: bool = False) -> dict[str, Path]:
+def with_flat_names(plan: SystemPlan, fmus: dict[str, Path]) -> SystemPlan:
+    """The system with the names of variables that FMUs with flat names have; its own says so."""
+    known = {name: _variables(fmu) for name, fmu in fmus.items()}
+
+    def flat(signal: str) -> str:
+        component, variable = split(signal)
+        wide = wide_name(variable)
+        return f"{component}.{wide if wide in known[component] else flat_name(variable)}"
+
+    return replace(
+        plan,
+        name=f"{plan.name}{FLAT}",
+        connections={flat(sink): flat(source) for sink, source in plan.connections.items()},
+        parameters={
+            component: {split(flat(f"{component}.{name}"))[1]: values[name] for name in values}
+            for component, values in plan.parameters.items()
+        },
+    )
+
+
+def _variables(fmu: Path) -> dict[str, Any]:
+    return {one.name: one for one in read_model_description(str(fmu)).modelVariables}
+
+
+def build_fmus(
+    plan: SystemPlan, folder: Path, force: bool = False, flat: bool = False
+) -> dict[str, Path]:
     """Write the FMUs of a system into a folder; return their paths by component.
 
     Parameters
     ----------
     force : bool
         Replace the FMU of another hammer.
+    flat : bool
+        Whether names of variables have no dots; names of the files say so.
     """
     found = {}
+    ending = f"{FLAT if flat else ''}.fmu"
     for component, name in plan.components.items():
-        path = folder / f"{name}.fmu"
+        path = folder / f"{name}{ending}"
         if name in PARTS:
-            build_part(PARTS[name], path)
+            build_part(PARTS[name], path, flat)
         elif name == HAMMER:
-            path = _hammer(plan, folder, force)
+            path = folder / f"{hammer_name(plan.hammer).removesuffix('.fmu')}{ending}"
+            scene = Scene.from_toml(plan.hammer)
+            refuse_other(path, scene, force)  # one of another scene has another name
+            build_hammer(scene, path, flat=flat)
         else:
             known = ", ".join([HAMMER, *PARTS])
             raise SystemPlanError(f"{component} = {name!r}: must be one of {known}")
@@ -168,21 +203,9 @@ def build_fmus(plan: SystemPlan, folder: Path, force: bool = False) -> dict[str,
     return found
 
 
-def _hammer(plan: SystemPlan, folder: Path, force: bool) -> Path:
-    """Write the FMU of the hammer; one of another scene has another name."""
-    scene = Scene.from_toml(plan.hammer)
-    path = folder / hammer_name(plan.hammer)
-    refuse_other(path, scene, force)
-    build_hammer(scene, path)
-    return path
-
-
 def write_system(plan: SystemPlan, fmus: dict[str, Path], path: Path) -> Path:
     """Write the archive; the same inputs give the same bytes."""
-    variables = {
-        component: {one.name: one for one in read_model_description(str(fmu)).modelVariables}
-        for component, fmu in fmus.items()
-    }
+    variables = {component: _variables(fmu) for component, fmu in fmus.items()}
     _check(plan, variables)
     entries = {"SystemStructure.ssd": _structure(plan, fmus, variables)}
     for component, values in plan.parameters.items():

@@ -76,13 +76,20 @@ def test_an_fmu_of_python_has_them_too(name):
     assert all(one.attrib["name"].isidentifier() for one in root.iter("ScalarVariable"))
 
 
-def test_two_variables_of_one_flat_name_are_refused():
-    root = ElementTree.fromstring(
-        "<fmiModelDescription><ModelVariables><ScalarVariable name='a.b'/>"
-        "<ScalarVariable name='a_b'/></ModelVariables></fmiModelDescription>"
-    )
-    with pytest.raises(ValueError, match=r"a\.b and a_b would both be a_b"):
+def test_two_variables_never_have_one_flat_name():
+    def names(*given):
+        nodes = "".join(f"<ScalarVariable name='{name}'/>" for name in given)
+        root = ElementTree.fromstring(
+            f"<fmiModelDescription><ModelVariables>{nodes}</ModelVariables></fmiModelDescription>"
+        )
         flatten(root)
+        return [node.attrib["name"] for node in root[0]]
+
+    assert names("a.b", "a_b", "c[1].d") == ["a__b", "a_b", "c_1_d"]
+    with pytest.raises(ValueError, match=r"a\.b and a__b would both be a__b"):
+        names("a.b", "a_b", "a__b")
+    with pytest.raises(ValueError, match=r"a\.b and a\[b\] would both be a__b"):
+        names("a.b", "a[b]")
 
 
 def test_a_flat_fmu_runs_and_holds_its_reference(built_library, tmp_path):

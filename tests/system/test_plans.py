@@ -90,7 +90,7 @@ def test_it_builds_what_is_named_or_all_and_tells_the_share(tmp_path, monkeypatc
     def noted(text, done=0.0):
         yield lambda text, share: told.append((text, share))
 
-    monkeypatch.setattr(archive, "build_fmus", lambda plan, folder, force: {})
+    monkeypatch.setattr(archive, "build_fmus", lambda plan, folder, force, flat: {})
     monkeypatch.setattr(archive, "write_system", lambda plan, fmus, path: path)
     monkeypatch.setattr(library, "library_here", dict)
     monkeypatch.setattr(progress, "progress", noted)
