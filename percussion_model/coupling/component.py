@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
+import os
 import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
@@ -300,7 +301,8 @@ class Component:
                     instanceName=name,
                 )  # fmt: skip
         except Exception as error:  # fmpy has no errors of its own
-            text = str(error).rpartition(folder)[2].lstrip("/\\")
+            text = str(error).replace(f"{folder}{os.sep}", "")
+            text = text.partition(f"{sharedLibraryExtension}. ")[2] or text
             raise CouplingError(
                 f"{name}: the library of its FMU cannot be loaded: {text}"
             ) from error

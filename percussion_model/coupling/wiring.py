@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from operator import itemgetter
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -115,9 +116,14 @@ class Wiring:
                     end = self._end(name, variable)
                     found[name][variable] = self._fitted(value, end)
         for system in reversed(self.archive.systems):
-            for name, value in self.archive.values[system].items():
-                for (component, variable), own in self._targets(system, name, value):
-                    found[component][variable] = own
+            targets = [
+                one
+                for name, value in self.archive.values[system].items()
+                for one in self._targets(system, name, value)
+            ]
+            # a variable that a connector feeds has the value of that, whatever else is bound to it
+            for _, (component, variable), own in sorted(targets, key=itemgetter(0)):
+                found[component][variable] = own
         return found
 
     def links(self) -> dict[str, list[Link]]:
@@ -226,8 +232,8 @@ class Wiring:
             _check_connector(signal_name(component, name), said, variable, unit)
         return End(component, name, variable, unit or said.unit)
 
-    def _targets(self, system: str, name: str, value: Value) -> Iterator[tuple[Place, Any]]:
-        """What a value that is bound to a system sets."""
+    def _targets(self, system: str, name: str, value: Value) -> Iterator[tuple[bool, Place, Any]]:
+        """What a value that is bound to a system sets: if by connections, the place, its value."""
         full, is_known = signal_name(system, name), False
         for inner in self.archive.systems:
             place = inner, name_within(inner, full) or ""
@@ -241,12 +247,12 @@ class Wiring:
                         f"{' or '.join(_SETTABLE)}"
                     )
                 for way in self._ways_from(place):
-                    yield way[-1], self._passed(value, way)
+                    yield True, way[-1], self._passed(value, way)
         for component, variables in self._variables.items():
             own = name_within(component, full) or ""
             if own in variables and name_within(system, component) is not None:
                 is_known = True
-                yield (component, own), self._fitted(value, self._end(component, own))
+                yield False, (component, own), self._fitted(value, self._end(component, own))
         if not is_known:
             self._refuse_name(full)
 
