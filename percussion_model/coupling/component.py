@@ -355,16 +355,22 @@ class Component:
         return self.FAMILIES[one.type]
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Set variables by name; enumerations by number or by word."""
+        """Set variables by name, also texts; enumerations by number or by word."""
         for name, value in values.items():
             one = self.find(name)
-            self.family(name)
+            if kind_of(one) != "String":
+                self.family(name)
             if one.variability == "constant" or one.initial == "calculated":
                 raise CouplingError(f"{self.name}.{name} is calculated: it cannot be set")
             if one.causality == "structuralParameter":
                 raise CouplingError(
                     f"{self.name}.{name} is a structural parameter: it cannot be set"
                 )
+            if kind_of(one) == "String":
+                if not isinstance(value, str):
+                    raise CouplingError(f"{self.name}.{name} = {value!r}: must be a text")
+                self._guarded(self.slave.setString, [one.valueReference], [value])
+                continue
             if isinstance(value, str):
                 value = number_of_word(self.name, one, value)
             self.writer([name]).write([self._converted(one, value)])

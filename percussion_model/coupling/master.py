@@ -36,6 +36,7 @@ from percussion_model.coupling.ssp import place_of, unpack
 from percussion_model.coupling.unpack import Allowance, check_xml, new_folder, unpack_zip
 from percussion_model.coupling.verdict import Jumps
 from percussion_model.coupling.wiring import Wiring
+from percussion_model.scene.rows import said_among
 from percussion_model.simulation.simulate import stop_on_interrupt
 
 Order = Literal["jacobi", "gauss-seidel"]
@@ -137,7 +138,10 @@ class Coupling:
         for signal, value in given.items():  # before those of the archive
             component, variable = place_of(signal, values)
             if component not in values:
-                raise CouplingError(f"{signal}: there is no FMU {component} in {self.path.name}")
+                raise CouplingError(
+                    f"{signal}: there is no FMU {component} in {self.path.name}: "
+                    f"{said_among(component, values)}"
+                )
             values[component][variable] = value
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from operator import itemgetter
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -33,6 +33,8 @@ from percussion_model.scene.rows import shortened
 from percussion_model.scene.units import UnitError
 
 REMEDY = 'give both a unit, or suppressUnitConversion="true" where the numbers are right'
+# From a component to another: two for each system between them.
+MOST_CONNECTORS = 100
 # Types of FMI that transformations go from and to.
 _TO = {
     "Linear": ("Real",), "Boolean": ("Boolean",), "Integer": ("Integer", "Enumeration"),
@@ -166,19 +168,17 @@ class Wiring:
         """What feeds an input in the end, and all to which connections lead on the way."""
         way = [sink]
         while True:
-            connection, source = self._feeds[way[0]]
+            _, source = self._feeds[way[0]]
             if source not in self._feeds:
                 return source, way
-            if source in way:
-                raise CouplingError(f"{connection}: leads back to itself")
             way.insert(0, source)
+            _check_length(way)
 
     def _ways_from(self, place: Place, before: tuple[Place, ...] = ()) -> Iterator[list[Place]]:
         """All to which connections lead on the ways from a connector of a system to components."""
-        if place in before:
-            raise CouplingError(f"connector {signal_name(*place)}: leads back to itself")
+        way = (*before, place)
+        _check_length(way)
         for sink in self._led.get(place, ()):
-            way = (*before, place)
             if sink[0] in self._variables:
                 yield [*way, sink]
             else:
@@ -285,6 +285,14 @@ class Wiring:
         if isinstance(found, str) and end.type in FAMILIES:
             return number_of_word(end.component, end.variable, found)
         return found
+
+
+def _check_length(way: Sequence[Place]) -> None:
+    if len(way) > MOST_CONNECTORS:
+        raise CouplingError(
+            f"connector {shortened(signal_name(*way[0]))}: its connections lead back to it, or "
+            f"through more than {MOST_CONNECTORS} connectors"
+        )
 
 
 def _check_connector(name: str, said: Connector, variable: Any, unit: Unit | None) -> None:

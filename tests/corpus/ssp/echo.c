@@ -1,5 +1,6 @@
 /* An FMU whose outputs are its inputs and parameters: output OUT + k tells what k was set to. */
 #include <stdlib.h>
+#include <string.h>
 
 #if defined _WIN32
 #define EXPORT __declspec(dllexport)
@@ -52,10 +53,16 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int forward) {
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 
+/* A text is told by its length. */
+EXPORT int fmi2SetString(void *c, const unsigned *r, size_t n, const char *const *v) {
+    for (size_t k = 0; k < n; k++) ((Echo *)c)->reals[r[k]] = (double)strlen(v[k]);
+    return 0;
+}
+
 /* Hosts look for all of them. */
 #define UNUSED(name)                                                                         \
     EXPORT int fmi2##name(void) { return 3; }
-UNUSED(SetDebugLogging) UNUSED(Terminate) UNUSED(Reset) UNUSED(GetString) UNUSED(SetString)
+UNUSED(SetDebugLogging) UNUSED(Terminate) UNUSED(Reset) UNUSED(GetString)
 UNUSED(GetFMUstate) UNUSED(SetFMUstate) UNUSED(FreeFMUstate) UNUSED(SerializedFMUstateSize)
 UNUSED(SerializeFMUstate) UNUSED(DeSerializeFMUstate) UNUSED(GetDirectionalDerivative)
 UNUSED(SetRealInputDerivatives) UNUSED(GetRealOutputDerivatives) UNUSED(CancelStep)

@@ -2,6 +2,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 #if defined _WIN32
 #define EXPORT __declspec(dllexport)
@@ -71,12 +72,18 @@ EXPORT int fmi3FreeFMUState(void *c, void **state) {
 }
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
+/* A text is told by its length. */
+EXPORT int fmi3SetString(void *c, const unsigned *r, size_t n, const char *const *v, size_t m) {
+    for (size_t k = 0; k < n; k++) ((Echo *)c)->values[r[k]] = (double)strlen(v[k]);
+    return 0;
+}
+
 /* Hosts look for all of them. */
 #define UNUSED(name)                                                                         \
     EXPORT int fmi3##name(void) { return 3; }
 UNUSED(SetDebugLogging) UNUSED(InstantiateModelExchange) UNUSED(InstantiateScheduledExecution)
 UNUSED(Terminate) UNUSED(Reset) UNUSED(EnterEventMode) UNUSED(EnterStepMode)
-UNUSED(GetString) UNUSED(SetString) UNUSED(GetBinary) UNUSED(SetBinary) UNUSED(GetClock)
+UNUSED(GetString) UNUSED(GetBinary) UNUSED(SetBinary) UNUSED(GetClock)
 UNUSED(SetClock) UNUSED(GetNumberOfVariableDependencies) UNUSED(GetVariableDependencies)
 UNUSED(SerializedFMUStateSize) UNUSED(SerializeFMUState) UNUSED(DeserializeFMUState)
 UNUSED(GetDirectionalDerivative) UNUSED(GetAdjointDerivative) UNUSED(EnterConfigurationMode)

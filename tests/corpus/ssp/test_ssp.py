@@ -219,3 +219,14 @@ def test_times_that_cannot_be_are_refused_and_leave_nothing(words, said, timed, 
     assert said in " ".join(capsys.readouterr().err.split())
     assert not Path("out").exists()
     assert not list(folder.iterdir())
+
+
+def test_options_name_what_stands_in_inner_systems(echoes, tmp_path, monkeypatch):
+    write_named("values of systems within systems", echoes, tmp_path / "case.ssp")
+    monkeypatch.chdir(tmp_path)
+    words = ("--set", "in.core.c.count=4", "--signal", "in.core.c.count_out", "--no-figures")
+    assert percussion("couple", "case.ssp", "--duration", "0.01", *words) == 0
+    head, *_, last = Path("out/case/signals.csv").read_text(encoding="utf-8").splitlines()
+    assert (head, last) == ('"time","in.core.c.count_out"', "0.01,4.0")
+    with pytest.raises(CouplingError, match=r"no FMU in in case\.ssp.*a, b, in\.core\.c, in\.d"):
+        Coupling("case.ssp", {"in.cor.c.count": 4})
