@@ -81,6 +81,8 @@ class Coupling:
         set before the run.
     stop : float or None
         Where the default experiment ends [s].
+    remark : str
+        What is not sure of the archive: units that its connections lack.
     """
 
     def __init__(
@@ -126,6 +128,7 @@ class Coupling:
         with naming(self.path):
             wiring = Wiring(archive, descriptions, others)
             self._links, values = wiring.links(), wiring.values()
+        self.remark = wiring.remark
         self.start, self.stop = archive.start or 0.0, archive.stop
         for name, description in descriptions.items():
             if callable(chosen := replaced.get(name)):
@@ -184,7 +187,8 @@ class Coupling:
             What Ctrl-C does when the present step is over: raise KeyboardInterrupt, or return
             what there is.
         tell : callable, optional
-            Called with what an FMU says of kernels that it is going to compile, before it does.
+            Called with `remark` and what an FMU says of kernels that it is going to compile,
+            before it does.
 
         Returns
         -------
@@ -199,6 +203,8 @@ class Coupling:
                     "changes"
                 )
             self._refuse_contradictions(count, tolerance)
+            if self.remark and tell is not None:
+                tell(self.remark)
             self._connect([*signals, *known_signals(self.outputs, JUDGED)])
             self._initialise(tell)
             control = None if tolerance is None else StepControl(self.ports, step, tolerance)

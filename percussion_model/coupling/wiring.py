@@ -101,6 +101,7 @@ class Wiring:
         # by the place to which a connection leads: the connection, and where it comes from
         self._feeds: dict[Place, tuple[Connection, Place]] = {}
         self._led: dict[Place, list[Place]] = {}  # the same from there on
+        self._lacking: list[str] = []
         for one in archive.connections:
             with naming(one):
                 source, sink = self._direction(one)
@@ -204,8 +205,23 @@ class Wiring:
                 end = self._between(place, unit, begin.variable, is_difference)
             with naming(connection):
                 change = chained(change, _change(begin, end, connection))
+            self._note_lack(begin, end, connection)
             begin = end
         return Link(sink.name, *source, change)
+
+    def _note_lack(self, begin: End, end: End, connection: Connection) -> None:
+        """Note a connection whose numbers stay as they are, since one end is without a unit."""
+        if end.type == "Real" and not connection.keeps_unit and None in (begin.unit, end.unit):
+            try:
+                conversion(begin.unit, end.unit)
+            except UnitError as error:
+                self._lacking.append(f"{connection}: {error}: its numbers stay as they are")
+
+    @property
+    def remark(self) -> str:
+        """What those should know who run it, empty if there is nothing; complete after `links`."""
+        others = f"; so do those of {len(self._lacking) - 1} more" if self._lacking[1:] else ""
+        return "".join(self._lacking[:1]) + others
 
     def _between(self, place: Place, unit: Unit | None, before: Any, is_difference: bool) -> End:
         """A connector of a system as a variable; what it does not say is as before it."""
@@ -351,7 +367,7 @@ def _change(source: End, sink: End, connection: Connection) -> Change | None:
         kind = transformation.kind
         raise CouplingError(f"its transformation is of {kind} values, not of {given} to {wanted}")
     converted = None
-    if wanted == "Real" and not connection.keeps_unit:
+    if wanted == "Real" and not connection.keeps_unit and None not in (source.unit, sink.unit):
         is_difference = source.is_difference or sink.is_difference
         converted = _conversion(source.unit, sink.unit, is_difference)
     if transformation is None:

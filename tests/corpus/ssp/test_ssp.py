@@ -111,7 +111,9 @@ def test_an_archive_gives_what_it_says_or_is_refused(case, echoes, tmp_path):
         return
     coupling = Coupling(path)
     duration = 2e-3 if coupling.stop is None else coupling.stop - coupling.start
-    run = coupling.run(duration, 1e-3, [name for name in case["right"] if name != "time"])
+    names, told = [name for name in case["right"] if name != "time"], []
+    run = coupling.run(duration, 1e-3, names, tell=told.append)
+    assert told == ([case["remark"]] if "remark" in case else [])
     assert run.error == ""
     found = {name: run[name][-1] for name in case["right"]}
     assert found == pytest.approx(case["right"], rel=1e-14)
