@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from io import BytesIO
 
 import matplotlib
 import numpy as np
@@ -85,6 +86,22 @@ def test_same_result_gives_same_files(results, tmp_path):
     second = figures(results["rigid drop"], tmp_path / "b")
     for a, b in zip(first, second, strict=True):
         assert a.read_bytes() == b.read_bytes()
+
+
+def test_a_result_draws_one_figure_that_a_notebook_shows(results):
+    with matplotlib.rc_context(STYLE):
+        drawn = dict(draw_figures(results["elastic"]))
+    for name, fig in drawn.items():
+        shown = results["elastic"].plot(name)._repr_png_()
+        assert shown.startswith(b"\x89PNG")
+        with matplotlib.rc_context(STYLE):
+            fig.savefig(buffer := BytesIO(), dpi=STYLE["figure.dpi"])
+        ours, theirs = imread(BytesIO(shown)), imread(BytesIO(buffer.getvalue()))
+        np.testing.assert_array_equal(ours, theirs)
+    with pytest.raises(ResultError, match="there is none: did you mean overview"):
+        results["elastic"].plot("overvew")
+    with pytest.raises(ResultError, match=r"this run has none of that name: .* stress_waves"):
+        results["drop"].plot("overview")
 
 
 def test_window_is_the_last_whole_blow(results):

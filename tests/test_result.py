@@ -4,6 +4,7 @@ import json
 import math
 import os
 import pickle
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -75,6 +76,20 @@ def test_the_summary_is_plain_and_complete(rigid, elastic):
     assert rigid.summary()["cells"] is None
     cells = {"wave": {"piston": 24, "bit": 28}, "modal": {"piston": 24, "bit": 24}}
     assert elastic.summary()["cells"] == cells[elastic.solver]
+
+
+def test_notebooks_show_the_numbers_of_drillers_and_what_a_scene_changes(elastic):
+    told = Scene(title="A <b> & c", feed={"force": 4000.0})._repr_html_()
+    assert "A &lt;b&gt; &amp; c" in told
+    assert "<td>feed.force</td><td>4000.0</td><td>N</td>" in told
+    assert "<table>" not in Scene()._repr_html_()  # which changes nothing
+    shown = elastic._repr_html_()
+    per_hour = elastic.summary()["driller_numbers"]["rate_of_penetration"]["value"]
+    (rate,) = re.findall(r"<td>Rate of penetration</td><td>([\d.]+) ± [\d.]+</td>", shown)
+    assert float(rate) == pytest.approx(per_hour, rel=1e-3)
+    assert f"{len(elastic.counted)} blows counted" in shown
+    warned = replace(elastic, warnings=["too <little> time"])
+    assert "<td>too &lt;little&gt; time</td>" in warned._repr_html_()
 
 
 def test_the_reference_needs_no_warning(elastic, rigid):

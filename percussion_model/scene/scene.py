@@ -131,6 +131,11 @@ class Scene:
         own = (key for key in sorted(self.given) if self[key] != self.row_of(key).default)
         return f"Scene({', '.join([repr(self.title), *(f'{key}={self[key]!r}' for key in own)])})"
 
+    def _repr_html_(self) -> str:
+        from percussion_model.scene.html_table import scene_html  # no run needs it
+
+        return scene_html(self)
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """Read a scene file, or a scene that ships.

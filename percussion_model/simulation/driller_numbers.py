@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from percussion_model.scene.html_table import html_table
 from percussion_model.simulation.columns import SUMMARY_COLUMNS
 from percussion_model.simulation.uncertain import known_error, mean_text, rate_text, scaled
 
@@ -70,3 +71,18 @@ def driller_text(summary: Mapping[str, Any], key: str) -> str:
     if key == "rate_of_penetration":
         return rate_text(summary, factor)
     return mean_text(summary, key, factor)
+
+
+def result_html(title: str, summary: Mapping[str, Any]) -> str:
+    """The numbers of drillers as a table for notebooks, with a run's length and its warnings."""
+    about = (
+        f"{summary['blows_after_settling']} blows counted in {summary['duration']:g} s, "
+        f"solver {summary['solver']}"
+    )
+    rows = [
+        (one.name, driller_text(summary, key), one.unit)
+        for key, one in DRILLER_NUMBERS.items()
+        if summary.get(key) is not None
+    ]
+    rows += [("Warning", text, "") for text in summary["warnings"]]
+    return html_table(title or "Result", about, ("number", "value", "unit"), rows)

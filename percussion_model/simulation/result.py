@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,7 +17,7 @@ from percussion_model.physics.records import BLOW, EVENT, EventKind, Mode
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
-from percussion_model.simulation.driller_numbers import driller_numbers
+from percussion_model.simulation.driller_numbers import driller_numbers, result_html
 from percussion_model.simulation.files import (
     LARGEST_TABLE,
     LARGEST_TEXT,
@@ -45,6 +46,7 @@ from percussion_model.simulation.uncertain import BY_CELLS, is_undecided, rate_f
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 __all__ = ["Result"]
 
@@ -148,6 +150,27 @@ class Result:
             f"{rate}blows={len(self.blows)}, events={len(self.events)}, "
             f"warnings={len(self.warnings)})"
         )
+
+    def _repr_html_(self) -> str:
+        return result_html(self.scene.title, self.summary())
+
+    def plot(self, figure: str = "overview") -> Figure:
+        """Draw a figure of the run, which a notebook shows and `savefig` writes.
+
+        Parameters
+        ----------
+        figure : str
+            A key of `percussion_model.interface.plotting.CAPTIONS`.
+
+        Raises
+        ------
+        ResultError
+            If there is no such figure, or none of this run.
+        """
+        # by its name, as pandas finds what draws: this layer knows nothing of figures
+        drawing = import_module("percussion_model.interface.plotting")
+        drawn: Figure = drawing.plot(self, figure)
+        return drawn
 
     @property
     def counted(self) -> np.ndarray:

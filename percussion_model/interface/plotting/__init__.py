@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from percussion_model.analysis.drill_string import StringReport, string_report
@@ -14,16 +15,18 @@ from percussion_model.interface.plotting.drill_string import draw_string
 from percussion_model.interface.plotting.motion import draw_motion
 from percussion_model.interface.plotting.overview import draw_overview
 from percussion_model.interface.plotting.stress import draw_stress
-from percussion_model.interface.plotting.style import save_figures
+from percussion_model.interface.plotting.style import STYLE, save_figures, shown_in_notebooks
 from percussion_model.interface.plotting.window import (
     NotRepeatable,
     last_blow_window,
     stress_fields,
 )
 from percussion_model.interface.progress import Report
+from percussion_model.scene.rows import said_among
+from percussion_model.simulation.files import ResultError
 from percussion_model.simulation.result import Result
 
-__all__ = ["CAPTIONS", "draw_figures", "figures"]
+__all__ = ["CAPTIONS", "draw_figures", "figures", "plot"]
 
 # What each figure shows, in the order in which they are made.
 CAPTIONS = {
@@ -84,6 +87,19 @@ def figures(result: Result, folder: str | Path, report: Report | None = None) ->
         The files, in the order of `CAPTIONS`, PNG before SVG.
     """
     return save_figures(lambda: draw_figures(result), folder, names=_names(result), report=report)
+
+
+def plot(result: Result, figure: str = "overview") -> Figure:
+    """Draw one figure of a result; as `Result.plot`."""
+    names = _names(result)
+    if figure not in names:
+        whose = "this run has none of that name" if figure in CAPTIONS else "there is none"
+        raise ResultError(f"figure {figure!r}: {whose}: {said_among(figure, names)}")
+    with rc_context(STYLE):
+        for name, drawn in draw_figures(result):
+            if name == figure:
+                return shown_in_notebooks(drawn)
+    raise ResultError(f"figure {figure!r}: the scene alone does not repeat this run")
 
 
 def _names(result: Result) -> list[str]:

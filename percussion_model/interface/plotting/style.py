@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -231,6 +232,19 @@ def save(
     for file, kind in zip(names, kinds, strict=True):
         fig.savefig(folder / file, dpi=dpi, metadata=_METADATA[kind])
     return names
+
+
+def shown_in_notebooks(fig: Figure) -> Figure:
+    """Let notebooks show a figure that pyplot does not know; return it."""
+    fig.__dict__["_repr_png_"] = partial(_png, fig)
+    return fig
+
+
+def _png(fig: Figure) -> bytes:
+    picture = BytesIO()
+    with rc_context(STYLE):
+        fig.savefig(picture, format="png", dpi=STYLE["figure.dpi"], metadata=_METADATA["png"])
+    return picture.getvalue()
 
 
 def save_png(fig: Figure, path: Path, dpi: float) -> Path:
