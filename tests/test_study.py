@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from percussion_model import Scene, SceneError, settled
+from percussion_model import Scene, SceneError, SimulationError, settled
 from percussion_model.analysis.study import Study, grid, study, table, workers
 from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
@@ -111,6 +111,68 @@ def test_without_pyarrow_a_study_has_no_parquet_and_says_so(whole, tmp_path, mon
     over = ["--over", "feed.farce=1"]
     said = CliRunner().invoke(app, ["study", "rigid", *over, "--out", str(tmp_path / "new")]).stderr
     assert '"percussion_model[parquet]"' in said
+
+
+def blow_energy_again(found):
+    return float(found.counted["blow_energy"].mean())
+
+
+def soft_only(found):
+    """A metric that fails at half of the points."""
+    if found.rate_of_penetration < 0.02:
+        raise ValueError("too hard")
+    return found.rate_of_penetration
+
+
+def test_a_metric_is_a_column_of_its_own_and_goes_on_with_its_study(whole, tmp_path):
+    folder, points = tmp_path / "out", grid(AXES)
+    calls = []
+
+    def interrupt(done, of):
+        calls.append(done)
+        if 0 < done < of:
+            raise KeyboardInterrupt
+
+    given = {"metric": blow_energy_again, "processes": 2}
+    with pytest.raises(KeyboardInterrupt):
+        study(SCENE, points, folder, progress=interrupt, **given)
+    finished = {path: path.stat().st_mtime_ns for path in (folder / PARTS).iterdir()}
+    found = study(SCENE, points, folder, **given)
+    assert finished
+    assert {path: path.stat().st_mtime_ns for path in finished} == finished
+    np.testing.assert_array_equal(found.rows["blow_energy_again"], whole.rows["blow_energy"])
+    for name in set(whole.rows.dtype.names) - {"wall_time"}:
+        np.testing.assert_array_equal(found.rows[name], whole.rows[name])
+    assert found.to_xarray()["blow_energy_again"].dims == points.keys
+    with pytest.raises(ResultError, match="holds another study"):
+        study(SCENE, points, folder, metric={"blow_energy_again": soft_only})
+    with pytest.raises(ResultError, match="holds another study"):
+        study(SCENE, points, folder)
+
+
+def test_a_metric_that_fails_takes_no_other_number_from_its_point(whole, tmp_path):
+    found = study(SCENE, grid(AXES), tmp_path / "out", processes=1, metric=soft_only)
+    hard = whole.rows["rate_of_penetration"] < 0.02
+    assert 0 < hard.sum() < len(hard)
+    np.testing.assert_array_equal(np.isnan(found.rows["soft_only"]), hard)
+    np.testing.assert_array_equal(
+        found.rows["rate_of_penetration"], whole.rows["rate_of_penetration"]
+    )
+    told = "metric soft_only: ValueError: too hard"
+    assert found.failures == [told if one else "" for one in hard]
+
+
+def test_a_metric_that_cannot_be_a_column_or_go_to_processes_is_refused(tmp_path):
+    points = grid({"feed.force": [2000.0, 3000.0]})
+    for metric in (lambda found: 1.0, {"kind": soft_only}, {"my rate": soft_only}, {"a": 3.0}):
+        with pytest.raises(SceneError, match="metric"):
+            study(SCENE, points, tmp_path / "out", metric=metric)
+    own = {"own": lambda found: 2.0 * found.blow_period}
+    with pytest.raises(SimulationError, match=r"metric own: .* or take processes=1"):
+        study(SCENE, points, tmp_path / "out", metric=own, processes=2)
+    assert not (tmp_path / "out").exists()
+    found = study(SCENE, points, tmp_path / "out", metric=own)  # one process, unless asked
+    np.testing.assert_array_equal(found.rows["own"], 2.0 * found.rows["blow_period"])
 
 
 def test_a_rate_has_its_error_where_that_shows(whole):
@@ -256,7 +318,7 @@ def test_all_that_computes_a_point_is_in_the_hash():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     left = {Path(name) for name in done.stdout.split()} - set(sources.source_files(COMPUTING))
     names = {path.relative_to(sources.PACKAGE).as_posix() for path in left}
-    of_study = {f"analysis/study/{name}.py" for name in ("__init__", "store", "workers")}
+    of_study = {f"analysis/study/{name}.py" for name in ("__init__", "metrics", "store", "workers")}
     assert names == of_study | {"__init__.py", "analysis/__init__.py"}
 
 

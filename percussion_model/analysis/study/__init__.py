@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from percussion_model.analysis.stationary import check_request
+from percussion_model.analysis.study.metrics import read_metrics, text_of, why_not_elsewhere
 from percussion_model.analysis.study.points import (
     Points,
     grid,
@@ -23,13 +24,21 @@ from percussion_model.analysis.study.points import (
     refuse_unknown,
     table,
 )
-from percussion_model.analysis.study.response import COMPUTING, FOUND, KINDS, run_points
+from percussion_model.analysis.study.response import (
+    COMPUTING,
+    FOUND,
+    KINDS,
+    Metric,
+    row_type,
+    run_points,
+)
 from percussion_model.analysis.study.store import PARQUET, Store
 from percussion_model.analysis.study.workers import (
     end_if_started_again,
     on_a_cluster,
     on_this_machine,
 )
+from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.rows import unit_suffix
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.driller_numbers import DRILLER_NUMBERS
@@ -90,7 +99,7 @@ class Study:
     scene : Scene
     points : Points
     rows : ndarray of `response.ROW`
-        One for each point, SI units.
+        One for each point, SI units; with a column more for each metric.
     failures : list of str
         What went wrong at each point, empty where nothing did.
     """
@@ -242,6 +251,7 @@ def study(
     cluster: str | None = None,
     progress: Callable[[int, int], None] | None = None,
     force: bool = False,
+    metric: Metric | Mapping[str, Metric] | None = None,
 ) -> Study:
     """Find the stationary response at many points.
 
@@ -261,13 +271,18 @@ def study(
         As in `settled`; aperiodic motion is run until the standard error of its
         rate is within `scatter`, a relative one, or for `most_blows`.
     processes : int, optional
-        On this machine; default as many as it has cores.
+        On this machine; default as many as it has cores, or one where a metric is in no file
+        that others can import.
     cluster : str, optional
         Address of a Dask scheduler that does the work instead.
     progress : callable, optional
         Called with points done and their number.
     force : bool
         Remove another study that the folder holds.
+    metric : callable or mapping, optional
+        Takes the `Settled` of a point and gives a number, in a column of the function's name;
+        several by names of their columns. With another text of a function the folder is
+        another study; functions that it calls are not looked at.
 
     Returns
     -------
@@ -276,23 +291,30 @@ def study(
     Raises
     ------
     SceneError
-        If a key or value makes no sense.
+        If a key, a value or the name of a metric makes no sense.
     ResultError
         If the folder holds something else, or points that other sources have computed.
     SimulationError
-        If workers keep dying, or no scheduler answers.
+        If workers keep dying, no scheduler answers, or a metric cannot go to processes asked for.
     """
     refuse_unknown(scene, points)
+    metrics = read_metrics(metric)
     check_request(scene, tolerance, most_blows, scatter)
     end_if_started_again()  # before the folder, which the first process holds
-    store = Store(Path(folder), _plan(scene, points, tolerance, most_blows, scatter), force)
+    if cluster is None and (why := why_not_elsewhere(metrics)):
+        if processes not in (None, 1):
+            raise SimulationError(f"{why}: put it in a file of its own, or take processes=1")
+        processes = 1
+    plan = _plan(scene, points, tolerance, most_blows, scatter)
+    plan["metrics"] = {name: text_of(function) for name, function in metrics.items()}
+    store = Store(Path(folder), plan, force, row_type(metrics))
     _rows, _failures, done = store.read(len(points))
     order = points.in_cheap_order()
     order = order[~done[order]]
     processes = processes or os.cpu_count() or 1
     size = max(1, min(MOST_A_PART, len(order) // (PARTS_A_PROCESS * processes)))
     parts = [order[k : k + size] for k in range(0, len(order), size)]
-    asked = tolerance, most_blows, scatter
+    asked = tolerance, most_blows, scatter, metrics
     tasks = [(scene, points.keys, points.values[part], *asked) for part in parts]
     count = int(done.sum())
     if progress is not None:

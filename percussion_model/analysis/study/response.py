@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from percussion_model.scene.scene import Scene
 from percussion_model.simulation.interruption import interruptible
 from percussion_model.simulation.means import numbers_over
 from percussion_model.solvers.sources import SOLVING
+
+# Makes a number of a point, a column of a user's own.
+Metric = Callable[[Settled], float]
 
 KINDS = ("periodic", "aperiodic", "stalled", "failed")
 
@@ -66,6 +70,7 @@ def run_points(
     tolerance: float,
     most_blows: int,
     scatter: float,
+    metrics: Mapping[str, Metric] | None = None,
 ) -> tuple[np.ndarray, list[str]]:
     """Find the stationary response at some points.
 
@@ -74,23 +79,25 @@ def run_points(
 
     Returns
     -------
-    rows : ndarray of ROW
+    rows : ndarray of `row_type(metrics)`
     failures : list of str
         What went wrong at each point, empty where nothing did.
     """
     from threadpoolctl import threadpool_limits
 
-    rows, failures = np.zeros(len(values), ROW), []
+    metrics = metrics or {}
+    rows, failures = np.zeros(len(values), row_type(metrics)), []
     with threadpool_limits(1):
         for row, point in zip(rows, values.tolist(), strict=True):
             changes = {k: whole_number(k, value) for k, value in zip(keys, point, strict=True)}
             try:
                 chosen = scene.replace(**changes)
                 with interruptible():
-                    _fill(row, settled(chosen, tolerance, most_blows, scatter=scatter))
-                failures.append("")
+                    found = settled(chosen, tolerance, most_blows, scatter=scatter)
+                    _fill(row, found)
+                failures.append(_add_metrics(row, metrics, found))
             except Exception as error:
-                for name in FOUND:
+                for name in (*FOUND, *metrics):
                     row[name] = math.nan
                 row["kind"] = KINDS.index("failed")
                 failures.append(f"{type(error).__name__}: {error}")
@@ -107,3 +114,20 @@ def _fill(row: Any, found: Settled) -> None:
     row["rate_of_penetration"] = found.rate_of_penetration
     row["rate_of_penetration_error"] = found.rate_of_penetration_error
     row["blow_period"], row["multiplier"] = found.blow_period, found.multiplier
+
+
+def row_type(metrics: Mapping[str, Metric]) -> np.dtype:
+    """Type of the row of a point, with a number for each metric."""
+    return np.dtype([*ROW.descr, *((name, "f8") for name in metrics)])
+
+
+def _add_metrics(row: Any, metrics: Mapping[str, Metric], found: Settled) -> str:
+    """Fill in the metrics; say what went wrong, which takes no other number from the point."""
+    faults = []
+    for name, function in metrics.items():
+        try:
+            row[name] = float(function(found))
+        except Exception as error:
+            row[name] = math.nan
+            faults.append(f"metric {name}: {type(error).__name__}: {error}")
+    return "; ".join(faults)

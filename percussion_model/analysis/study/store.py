@@ -47,10 +47,14 @@ class Store:
         another plan is refused.
     force : bool
         Remove another study instead. A folder that holds none is refused all the same.
+    row : dtype
+        Of the numbers of a point.
     """
 
-    def __init__(self, folder: Path, plan: dict[str, Any], force: bool = False) -> None:
-        self.folder = folder
+    def __init__(
+        self, folder: Path, plan: dict[str, Any], force: bool = False, row: np.dtype = ROW
+    ) -> None:
+        self.folder, self.row = folder, row
         self._hold = hold(folder)
         if self._hold is None:
             raise ResultError(f"{folder} {IS_HELD}: wait until it has ended, or give another --out")
@@ -118,16 +122,16 @@ class Store:
 
         Returns
         -------
-        rows : ndarray of ROW, shape (count,)
+        rows : ndarray, shape (count,)
         failures : list of str
         done : ndarray of bool, shape (count,)
         """
-        rows, failures = np.zeros(count, ROW), [""] * count
+        rows, failures = np.zeros(count, self.row), [""] * count
         done = np.zeros(count, bool)
         damaged = []
         for path in sorted((self.folder / PARTS).glob("*.npz")):
             try:
-                part, found, words = _read_part(path, count)
+                part, found, words = _read_part(path, count, self.row)
             except (OSError, ValueError, LookupError, RecursionError) as error:
                 why = reason(error).removeprefix(f"{path}: cannot be read: ")
                 damaged.append(f"{path.name}: cannot be read ({why})")
@@ -143,7 +147,7 @@ class Store:
         return rows, failures, done
 
 
-def _read_part(path: Path, count: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
+def _read_part(path: Path, count: int, row: np.dtype) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Points, rows and failures of a part of a study of so many points."""
     arrays = load_arrays(path)
     missing = {"part", "rows", "failures"} - arrays.keys()
@@ -152,7 +156,7 @@ def _read_part(path: Path, count: int) -> tuple[np.ndarray, np.ndarray, list[str
     part, rows, words = arrays["part"], arrays["rows"], json.loads(str(arrays["failures"]))
     if part.dtype.kind not in "iu" or part.ndim != 1 or np.any((part < 0) | (part >= count)):
         raise ResultError(f"names points that are not among the {count}")
-    if rows.dtype != ROW or rows.shape != part.shape:
+    if rows.dtype != row or rows.shape != part.shape:
         raise ResultError("its rows are not those of its points")
     if not isinstance(words, list) or [type(one) for one in words] != [str] * len(part):
         raise ResultError("its failures are not those of its points")
