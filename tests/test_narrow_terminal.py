@@ -155,7 +155,7 @@ def test_statements_of_the_paper_fit(shown, monkeypatch):
         ("run_sinking", "percussion_model.verification.paper.rock_law"),
         ("save_figures", "percussion_model.interface.plotting.style"),
     ):
-        monkeypatch.setattr(importlib.import_module(place), name, lambda *words, **more: None)
+        monkeypatch.setattr(importlib.import_module(place), name, lambda *words, **more: [])
     window = importlib.import_module("percussion_model.interface.plotting.window")
     monkeypatch.setattr(window, "last_blow_window", lambda result: None)
 

@@ -325,12 +325,29 @@ def test_the_parts_of_the_paper_are_told(heard, tmp_path, monkeypatch):
 
     monkeypatch.setattr(runs, "run_sweep", sweep)
     style = importlib.import_module("percussion_model.interface.plotting.style")
-    monkeypatch.setattr(style, "save_figures", lambda *words, **more: None)
+    monkeypatch.setattr(style, "save_figures", lambda *words, **more: [])
     words = ["paper", "--out", str(tmp_path / "out")]
     assert _guarded(lambda: app(words, standalone_mode=False)) == INTERRUPTED
     count = 4 + len(runs.SWEEPS)
     assert f"part 1 of {count}, drop tests and sinking, figure 6" in heard.getvalue()
     assert f"3 of 31 points of figure 9a, part 2 of {count}, 9%" in heard.getvalue()
+    words = [*words, "--only", "figure9"]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == INTERRUPTED
+    assert f"points of figure 9a, part 1 of {1 + len(runs.SWEEPS)}, 9%" in heard.getvalue()
+
+
+def test_one_figure_of_the_paper_is_computed_alone_and_a_run_of_all_goes_on(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    runs = importlib.import_module("percussion_model.verification.paper.runs")
+    monkeypatch.chdir(tmp_path)
+    words = ["paper", "--out", "out", "--only", "figure6", "--pdf"]
+    assert _guarded(lambda: app(words, standalone_mode=False)) == 0
+    made = {path.name for path in Path("out").iterdir() if path.name[0] != "."}
+    assert made == {"made_by.json", *(f"figure6.{kind}" for kind in ("pdf", "png", "svg"))}
+    assert Path("out/figure6.pdf").read_bytes().startswith(b"%PDF")
+    monkeypatch.setattr(runs, "run_drops", lambda scene: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert _guarded(lambda: app(words[:3], standalone_mode=False)) == INTERRUPTED  # not refused
+    assert _guarded(lambda: app([*words, "--json", "-"], standalone_mode=False)) == 2
 
 
 # ----------------------------------------------------------------- several runs

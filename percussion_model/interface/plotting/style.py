@@ -282,4 +282,5 @@ def save_png(fig: Figure, path: Path, dpi: float) -> Path:
 _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": "percussion_model"},
     "svg": {"Date": None, "Creator": "percussion_model"},
+    "pdf": {"CreationDate": None, "Creator": "percussion_model", "Producer": "percussion_model"},
 }
