@@ -5,6 +5,7 @@ The console script is this one, above both packages, since the model knows nothi
 
 from __future__ import annotations
 
+from fmu_src.commands.controller import controller
 from fmu_src.commands.fmu import fmu
 from fmu_src.commands.native import native
 from fmu_src.commands.scenario import SETTINGS, scenario
@@ -12,7 +13,7 @@ from fmu_src.commands.system import system
 from percussion_model.interface import cli
 
 app = cli.app
-for _command in (fmu, native, system):
+for _command in (fmu, native, controller, system):
     cli.add(_command)
 cli.add(scenario, settings=SETTINGS)
 

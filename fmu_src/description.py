@@ -21,12 +21,16 @@ CAPABILITIES = {
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
 }
+_OF_STATES = "canGetAndSetFMUstate", "canSerializeFMUstate"
 _INITIAL = {"parameter": "exact", "output": "calculated"}
 
 
 @dataclass(frozen=True)
 class About:
-    """What the head of a model description says; times in s. `flat` names have no dots."""
+    """What the head of a model description says; times in s.
+
+    `flat` names have no dots; without `saves` an instance cannot save its state.
+    """
 
     model: str
     description: str
@@ -36,6 +40,7 @@ class About:
     author: str = "percussion_model developers"
     license: str = "BSD-3-Clause"
     flat: bool = False
+    saves: bool = True
 
 
 class Shell(NamedTuple):
@@ -89,7 +94,8 @@ def _to_xml(about: About, variables: Sequence[Variable], shell: Shell) -> Elemen
     root = Element("fmiModelDescription", head)
     needs = {"needsExecutionTool": str(shell.needs_python).lower()}
     model = {"modelIdentifier": about.model, "canNotUseMemoryManagementFunctions": "true"}
-    SubElement(root, "CoSimulation", needs | CAPABILITIES | model)
+    able = CAPABILITIES if about.saves else CAPABILITIES | dict.fromkeys(_OF_STATES, "false")
+    SubElement(root, "CoSimulation", needs | able | model)
     root.append(write_units({variable.unit for variable in variables if variable.unit}))
     if any(variable.enumeration for variable in variables):
         root.append(_type_definitions(variables))

@@ -16,10 +16,14 @@ from fmu_src.parts import (
     rock_profile,
     supply,
 )
+from fmu_src.parts import own_controller as own
 from fmu_src.parts.part import COUNT, PartTable
 from fmu_src.staging import stage
 from fmu_src.units import fmi_unit
 from fmu_src.variables import FILE, Variable, magnitude, number_row, write_variables
+from percussion_model.coupling.component import CouplingError
+from percussion_model.coupling.fresh import fresh
+from percussion_model.coupling.python_part import PythonPart
 
 # First value references, units to display, and the default experiment [s].
 FIRST = {"input": 1, "output": 100, "parameter": 200}
@@ -64,7 +68,7 @@ def _given(
     part: PartTable, name: str, reference: int, causality: Any, entry: tuple[Any, ...]
 ) -> Variable:
     unit, lower, upper, start, text = entry
-    row = number_row(name, "" if unit == COUNT else unit, lower, upper, text)
+    row = number_row(name, "" if unit in (COUNT, None) else unit, lower, upper, text)
     discrete = "discrete" if causality == "input" else "fixed"
     common: dict[str, Any] = {
         "name": name, "reference": reference, "causality": causality, "description": text,
@@ -87,9 +91,9 @@ def _given(
     return _real(part, unit, nominal=magnitude(start), **common)
 
 
-def _real(part: PartTable, unit: str, **rest: Any) -> Variable:
-    shown = fmi_unit(unit)
-    given = {"variability": "continuous", "display": DISPLAYS.get(shown)} | rest
+def _real(part: PartTable, unit: str | None, **rest: Any) -> Variable:
+    shown = None if unit is None else fmi_unit(unit)
+    given = {"variability": "continuous", "display": DISPLAYS.get(shown or "")} | rest
     return Variable(type="Real", unit=shown, **given)
 
 
@@ -102,3 +106,66 @@ def build_part(part: PartTable, path: Path, flat: bool = False) -> str:
         path, about, variables, bundle, part.slave, {FILE: write_variables(variables)},
         write_page(about, variables),
     )  # fmt: skip
+
+
+def build_controller(file: Path, name: str, path: Path) -> str:
+    """Write the FMU of a controller in Python; say why its state cannot be saved, if it cannot.
+
+    Parameters
+    ----------
+    file, name : Path, str
+        A class, a factory or a function, as `percussion_model.coupling.Coupling` takes it; the
+        numbers that it can be given become parameters.
+
+    Raises
+    ------
+    CouplingError
+        If that is no controller, or fails in its first steps.
+    """
+    kept, starts = _tried(file, name)
+    table = replace(
+        controller.TABLE,
+        name=path.stem,
+        slave=own.OwnControllerPart,
+        description=f"{name} of {file.name}, a controller of feed and pressure",
+        outputs={one: controller.TABLE.outputs[one] for one in own.SIGNALS},
+        parameters={one: _argument(one, start) for one, start in starts.items()},
+        at_start=dict.fromkeys(own.SIGNALS, tuple(controller.TABLE.inputs)),
+    )
+    variables = part_variables(table)
+    about = About(
+        table.name, table.description, STOP_TIME, STEP_SIZE, author="", saves=not kept
+    )  # fmt: skip
+    resources: dict[str, str | bytes] = {
+        FILE: write_variables(variables), own.SOURCE: file.read_bytes(), own.NAME: name,
+    }  # fmt: skip
+    bundle = stage("drilling_system", "parts", with_model=False)
+    write_fmu(path, about, variables, bundle, table.slave, resources, write_page(about, variables))
+    return kept
+
+
+def _argument(name: str, start: Any) -> tuple[Any, ...]:
+    """Entry of an argument of a controller, whose unit and bounds nobody knows."""
+    bound = own.LARGEST[type(start)]
+    return COUNT if type(start) is int else None, -bound, bound, start, f"{name} of the controller"
+
+
+def _tried(file: Path, name: str) -> tuple[str, dict[str, Any]]:
+    """Let a controller do its first steps; its arguments, and why its state cannot be saved."""
+    inputs = {one: entry[3] for one, entry in controller.TABLE.inputs.items()}
+    try:
+        given = own.loaded(file, name)
+        work = fresh("controller", given, is_new=True)
+        part = PythonPart("controller", lambda: work, inputs)
+        part.begin()
+        starts = own.arguments_of(given) if own.is_maker(given) else {}
+        model = own.OwnController({**starts, own.SOURCE: file, own.NAME: name})
+    except CouplingError:
+        raise
+    except Exception as error:
+        raise CouplingError(f"{file}:{name}: {type(error).__name__}: {error}") from None
+    for step in (0.0, STEP_SIZE, STEP_SIZE):
+        part.step(0.0, step)
+        part.reader(own.SIGNALS).read()
+        model.step(inputs, step)
+    return model.why_not_saved(), starts

@@ -26,7 +26,7 @@ from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
 
 SYSTEMS = scenario_folder() / "systems"
-HAMMER = "PercussiveHammer"
+HAMMER, CONTROLLER = "PercussiveHammer", "DrillController"
 # What names of files with flat names of variables have more.
 FLAT = "Flat"
 # Masters find the parameters of all components under one name.
@@ -214,6 +214,34 @@ def write_system(plan: SystemPlan, fmus: dict[str, Path], path: Path) -> Path:
         entries[f"resources/{fmu.name}"] = fmu.read_bytes()
     write_archive(path, entries)
     return path
+
+
+def write_with_controller(
+    plan: SystemPlan, controller: Path, folder: Path, path: Path
+) -> dict[str, Any]:
+    """Write the archive of a system with another FMU in the place of its controller.
+
+    Parameters
+    ----------
+    folder : Path
+        For the other FMUs.
+
+    Returns
+    -------
+    dict
+        Values of the system's file that the controller has no variable for, left out.
+    """
+    mine = next((one for one, name in plan.components.items() if name == CONTROLLER), None)
+    if mine is None:
+        raise SystemPlanError(f"{plan.name} has no {CONTROLLER} in whose place one could be put")
+    others = {one: name for one, name in plan.components.items() if one != mine}
+    fmus = build_fmus(replace(plan, components=others), folder)
+    fmus = {one: controller if one == mine else fmus[one] for one in plan.components}
+    names = _variables(controller)
+    given = plan.parameters.get(mine, {})
+    kept = {name: value for name, value in given.items() if name in names}
+    write_system(replace(plan, parameters=plan.parameters | {mine: kept}), fmus, path)
+    return {name: value for name, value in given.items() if name not in names}
 
 
 def split(signal: str) -> tuple[str, str]:

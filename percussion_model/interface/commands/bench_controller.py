@@ -54,7 +54,7 @@ def bench_controller(
         from percussion_model.coupling.bench import STEP, bench, mean_points, mean_points_error
     common.check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
-    source = None if controller is None else Path(_file_and_name(controller)[0])
+    source = None if controller is None else Path(file_and_name(controller)[0])
     claimed = common.claim(
         "bench-controller", out, Path("out") / "bench-controller", force,
         system=common.digest(system), controller=controller, file=common.digest(source),
@@ -129,7 +129,7 @@ def _show(scores: Sequence[Score]) -> None:
     print_notes([mean, about_runs(scores), about_columns(), about_errors(scores)])
 
 
-def _file_and_name(controller: str) -> tuple[str, str]:
+def file_and_name(controller: str) -> tuple[str, str]:
     """File and name of FILE.py:NAME; an FMU has no name."""
     file, _, name = controller.rpartition(":")
     return (file, name) if file.endswith(".py") else (controller, "")
@@ -142,7 +142,7 @@ def _load(controller: str | None) -> Any:
 
     if controller is None:
         return None
-    file, name = _file_and_name(controller)
+    file, name = file_and_name(controller)
     if not Path(file).is_file():
         raise CouplingError(f"{file}: no such file")
     if not name:
