@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import pytest
 
@@ -95,3 +96,58 @@ def test_a_name_says_how_waves_are_computed_and_nothing_else():
         Scene().replace(**{"solver.fidelity": "rigid", "solver.name": "fem"})
     rigid = Scene().replace(**{"solver.fidelity": "rigid"})
     assert rigid.computed_by("fem").solver_name == "fem"
+
+
+OLD = """\
+title = "Old"  # kept
+
+[feed]
+force = "3 kN"  # measured
+[blow_map]   # no more
+density = 2
+# of the map
+[solver]
+name = "chain"  # as it was called
+cells = 20
+"""
+UP_TO_DATE = """\
+title = "Old"  # kept
+
+[feed]
+force = "3 kN"  # measured
+[solver]
+name = "wave"  # as it was called
+cells = 20
+"""
+
+
+def test_an_older_scene_is_brought_up_to_date_with_its_comments(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("old.toml").write_text(OLD)
+    with pytest.raises(SceneError):
+        Scene.from_toml("old.toml")
+    assert percussion("upgrade", "old.toml", "-o", "new.toml") == 0
+    told = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in told] == ["[blow_map]", 'solver.name = "chain"']
+    assert Path("new.toml").read_text() == UP_TO_DATE
+    assert Path("old.toml").read_text() == OLD
+    assert Scene.from_toml("new.toml").solver_name == "wave"
+    assert percussion("upgrade", "new.toml") == 0
+    assert "nothing to change" in capsys.readouterr().out
+    assert percussion("upgrade", "old.toml", "-o", "new.toml") == BAD_INPUT  # which is there
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('solver = {name = "chain"}', "solver.name is not written on a line of its own"),
+        ('[solver]\nname = "chain"\ncels = 3', "unknown key solver.cels"),
+        ("[solver", "not valid TOML"),
+    ],
+)
+def test_what_cannot_be_brought_up_to_date_is_said(text, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("old.toml").write_text(text)
+    assert percussion("upgrade", "old.toml", "-o", "new.toml") == BAD_INPUT
+    assert said in capsys.readouterr().err
+    assert not Path("new.toml").exists()

@@ -45,6 +45,7 @@ from percussion_model.interface.commands.rocks import rocks
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
 from percussion_model.interface.commands.stability import stability
 from percussion_model.interface.commands.study import study
+from percussion_model.interface.commands.upgrade import upgrade
 from percussion_model.interface.commands.validate import validate
 from percussion_model.interface.messages import usage_text
 from percussion_model.interface.progress import lines
@@ -173,6 +174,7 @@ for _command in (
     couple,
     bench_controller,
     new,
+    upgrade,
     rocks,
     bits,
     hammers,
