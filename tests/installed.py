@@ -1,14 +1,17 @@
 """The product as a wheel installs it, without the clone: `python -m tests.installed [PYTHON ...]`.
 
 For each Python that is named, or else for each of 3.11 to 3.13 that is found, an environment is
-made, the wheel is installed with all that users need, and a task of each kind is done from an
-empty folder. That takes some minutes a Python, most of them to compile.
+made, the wheel is installed with all that users need, and README's commands in their order and a
+task of each kind are done from an empty folder. That takes some minutes a Python, most of them to
+compile.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -115,7 +118,12 @@ def whole_environment(folder: Path, wheel: Path, python: str, extra: str) -> Env
     subprocess.run([python, "-m", "venv", str(folder / "venv")], check=True)
     made = _environment(folder)
     pip = [str(made.program("python")), "-m", "pip", "install", "-q"]
-    subprocess.run([*pip, f"{wheel}[{extra}]"], check=True, env=made.variables)
+    if wheel.is_dir():  # of which pip takes the one for this system, and from nowhere else
+        taken = ["--no-deps", "--no-index", "--find-links", str(wheel), "percussion_model"]
+        subprocess.run([*pip, *taken], check=True, env=made.variables)
+        subprocess.run([*pip, f"percussion_model[{extra}]"], check=True, env=made.variables)
+    else:
+        subprocess.run([*pip, f"{wheel}[{extra}]"], check=True, env=made.variables)
     return made
 
 
@@ -124,6 +132,33 @@ def _environment(folder: Path) -> Environment:
     variables |= {name: str(folder / name.lower()) for name in CACHES}
     (folder / "empty").mkdir()
     return Environment(folder / "venv", folder / "empty", variables)
+
+
+# Commands of README that an installed wheel cannot do or that wait for a reader: what follows
+# `pip`, `build.py` and `explore`.
+NOT_HERE = ("pip", "python3")
+WAITS = "explore"
+
+
+def readme_blocks() -> tuple[list[list[str]], list[str]]:
+    """Words of README's commands that an installation can do, and its scripts in Python."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    scripts = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    fenced = "".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))
+    plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    lines = re.findall(r"^    (\S.*)$", plain, re.MULTILINE) + fenced.splitlines()
+    words = [shlex.split(line, comments=True) for line in lines]
+    return [one for one in words if one and one[0] not in NOT_HERE and WAITS not in one], scripts
+
+
+def do_readme(made: Environment) -> None:
+    """Do README's commands in their order, and its scripts; `AssertionError` where one fails."""
+    commands, scripts = readme_blocks()
+    assert len(commands) > 3
+    assert scripts
+    for words in [*commands, *(["python", "-c", text] for text in scripts)]:
+        done = made.call(*words[1:], name=words[0])
+        assert done.returncode == 0, f"{' '.join(words)}\n{done.stderr}"
 
 
 def do_tasks(made: Environment) -> None:
@@ -146,7 +181,9 @@ def do_tasks(made: Environment) -> None:
 def try_python(python: str, wheel: Path, extra: str = EVERYTHING) -> None:
     """Install a wheel for a Python and do all tasks, in a folder that is removed again."""
     with tempfile.TemporaryDirectory(prefix="percussion-") as folder:
-        do_tasks(whole_environment(Path(folder), wheel, python, extra))
+        made = whole_environment(Path(folder), wheel, python, extra)
+        do_readme(made)
+        do_tasks(made)
 
 
 def found_pythons() -> list[str]:
@@ -166,10 +203,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition(":")[0])
     parser.add_argument("pythons", nargs="*", metavar="PYTHON", help="left out: those found")
     parser.add_argument("--extra", default=EVERYTHING, help="extras that are installed")
+    parser.add_argument(
+        "--wheels", type=Path, help="folder of wheels for platforms; left out: made"
+    )
     words = parser.parse_args()
     failed = 0
     with tempfile.TemporaryDirectory(prefix="percussion-wheel-") as folder:
-        wheel = build_wheel(Path(folder))
+        wheel = words.wheels.resolve() if words.wheels else build_wheel(Path(folder))
         for python in words.pythons or found_pythons():
             began = time.monotonic()
             print(f"{python}: installing and trying ...", flush=True)
