@@ -20,6 +20,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "mathml",
+    "notebooks",
 ]
 source_suffix = {".md": "markdown"}
 root_doc = "index"

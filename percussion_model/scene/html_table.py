@@ -33,7 +33,9 @@ def scene_html(scene: Scene) -> str:
     ]
     if not rows:
         about += "; all parameters are those of the reference"
-    return html_table(scene.title or "Scene", about, ("parameter", "value", "unit", "is"), rows)
+    return html_table(
+        scene.title or "Scene", about, ("parameter", "value", "unit", "meaning"), rows
+    )
 
 
 def _shown(value: Any) -> str:
