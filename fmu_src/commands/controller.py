@@ -92,5 +92,5 @@ def _write(file: Path, name: str, output: Path, system: Path | None) -> int:
         )
     if left:
         values = ", ".join(f"{one} = {value}" for one, value in left.items())
-        common.print_message(f"the controller has no {values} of {system}: left out")
+        common.print_message(f"the controller has no {values} of {system}: omitted")
     return INVALID if found else 0

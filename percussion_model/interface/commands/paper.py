@@ -59,7 +59,7 @@ def paper(
     """Reproduce figures 4 and 6 to 9 of the paper, and check what it says one by one."""
     common.check_outputs(out, json_file)
     if only and json_file is not None:
-        raise common.refusal("--json: holds the statements, which --only leaves out")
+        raise common.refusal("--json: holds the statements, which --only omits")
     try:
         from percussion_model.interface.plotting import paper as _plotting  # noqa: F401
     except ImportError as error:

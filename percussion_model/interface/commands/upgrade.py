@@ -22,7 +22,7 @@ class Change(NamedTuple):
     value : str or None
         That is no more; None: any.
     new : str or None
-        Value in its place; None: the key is left out.
+        Value in its place; None: the key is removed.
     why : str
     version : str
         In which it changed.
@@ -52,7 +52,10 @@ def upgrade(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="File to write; left out: only says what changed"
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="File to write; without it only says what changed.",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
@@ -105,7 +108,7 @@ def edited(text: str, changes: list[Change]) -> tuple[str, list[str]]:
             lines.append(line)
             continue
         if head or entry:  # of a table its head alone
-            now = "left out" if change.new is None else f'now "{change.new}"'
+            now = "removed" if change.new is None else f'now "{change.new}"'
             was = f"[{change.key}]" if change.value is None else f'{change.key} = "{change.value}"'
             told.append(f"{was}: {now}, since {change.version}: {change.why}")
         if entry and change.new is not None:
