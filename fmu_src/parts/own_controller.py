@@ -14,6 +14,7 @@ from typing import Any
 
 from fmu_src.parts import controller
 from fmu_src.parts.part import Model, Part, form_fault
+from fmu_src.slave.states import StateError
 from percussion_model.scene.rows import said_among
 
 # Within the resources of the FMU: the file, and the name in it.
@@ -114,7 +115,9 @@ class OwnController(Model):
     def restore(self, saved: dict[str, Any]) -> None:
         """Put them back."""
         self.sent = dict(saved["sent"])
-        for place, name in zip(self._places(), ("file", "object"), strict=True):
+        of_file, of_object = self._places()
+        of_object.clear()  # of what came later too
+        for place, name in ((of_file, "file"), (of_object, "object")):
             place.update(deepcopy(saved[name]))
 
     def why_not_saved(self) -> str:
@@ -167,6 +170,14 @@ class OwnControllerPart(Part):
         assert isinstance(model, OwnController)
         model.time = self.start_time + time - step_size
         super().step(time, step_size)
+
+    def save(self) -> bytes:
+        """State of the model, where it is known."""
+        model = self.initialise()
+        assert isinstance(model, OwnController)
+        if why := model.why_not_saved():
+            raise StateError(f"the controller keeps {why}, which no saved state holds")
+        return super().save()
 
     def identity(self) -> Any:
         """As of other parts, and the user's file."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import textwrap
 
 import numpy as np
@@ -11,6 +12,8 @@ from fmpy import read_model_description
 
 from fmu_src.command_line import app
 from fmu_src.parts.build import build_controller
+from fmu_src.parts.controller import TABLE
+from fmu_src.parts.own_controller import NAME, SOURCE, OwnController
 from fmu_src.system.archive import write_with_controller
 from percussion_model.coupling import Coupling
 from percussion_model.coupling.component import CouplingError
@@ -108,6 +111,27 @@ def test_steps_are_taken_back_where_the_state_is_known_and_refused_where_not(fee
     assert not read_model_description(str(path)).coSimulation.canGetAndSetFMUstate
     with pytest.raises(CouplingError, match="state"):
         Coupling(feed_control, replaced={"controller": path}).run(0.05, 1e-3, tolerance=1e-2)
+
+
+def test_a_state_has_what_the_file_and_the_object_keep(tmp_path):
+    file = tmp_path / "my.py"
+    file.write_text(
+        PI + "\ncount = 0\n\n\ndef counting(inputs, time, step):\n    global count\n"
+        "    count += 1\n    return held(inputs, time, step) | {'force_command': count}\n"
+    )
+    for name, at in (("PI", {"gain": 0.5, "time": 0.2}), ("counting", {})):
+        made = [OwnController({**at, SOURCE: file, NAME: name}) for _ in range(2)]
+        inputs = {one: entry[3] for one, entry in TABLE.inputs.items()} | {"feed_force": 2000.0}
+        for _ in range(3):
+            made[0].step(inputs, 1e-3)
+        kept = json.loads(json.dumps(made[0].save()))
+        made[1].restore(kept)  # of its own file, run anew
+        later = [(one.step(inputs, 1e-3), one.outputs())[1] for one in made]
+        assert later[0] == later[1]
+        made[0].restore(kept)
+        made[0].step(inputs, 1e-3)
+        assert made[0].outputs() == later[0]
+        assert made[0].outputs()["force_command"] != kept["sent"]["force_command"]
 
 
 @pytest.mark.parametrize(
