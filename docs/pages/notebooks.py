@@ -1,7 +1,4 @@
-"""Run the notebooks as Jupyter does, and keep what they show: `python -m docs.make_notebooks`.
-
-Needs nbclient and ipykernel, of the extra `docs`. Names of notebooks may follow.
-"""
+"""Notebooks, run as Jupyter does, with what they show; by their names, all if none is named."""
 
 from __future__ import annotations
 
@@ -11,10 +8,9 @@ import tempfile
 import time
 from pathlib import Path
 
-import nbformat
-from nbclient import NotebookClient
+from docs.blocks import DOCS, Made
 
-FOLDER = Path(__file__).with_name("notebooks")
+FOLDER = DOCS / "notebooks"
 TIMEOUT = 600  # of a cell, in which a clone may compile [s]
 # Of each notebook, so that a run changes nothing but what a cell shows.
 METADATA = {
@@ -23,8 +19,24 @@ METADATA = {
 }
 
 
-def make(path: Path) -> None:
-    """Run a notebook in an empty folder, and write it with its outputs."""
+def made(*names: str) -> Made:
+    """Run them one by one."""
+    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"
+    texts = {}
+    for path in sorted(FOLDER.glob("*.ipynb")):
+        if not names or path.stem in names:
+            began = time.monotonic()
+            texts[f"notebooks/{path.name}"] = executed(path)
+            print(f"{path.name}: {time.monotonic() - began:.1f} s", flush=True)
+    return Made(texts=texts)
+
+
+def executed(path: Path) -> str:
+    """Text of a notebook that was run in an empty folder."""
+    import nbformat
+    from nbclient import NotebookClient
+
     notebook = nbformat.read(path, as_version=4)
     with tempfile.TemporaryDirectory() as folder:
         where = {"metadata": {"path": folder}}
@@ -37,19 +49,4 @@ def make(path: Path) -> None:
                 raise SystemExit(f"{path.name}: a cell warns: {output.text}")
         if cell["source"].startswith("!"):  # paths of this machine
             cell.outputs = []
-    nbformat.write(notebook, path)
-
-
-def main(names: list[str]) -> None:
-    """Make all notebooks, or those that are named."""
-    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"
-    for path in sorted(FOLDER.glob("*.ipynb")):
-        if not names or path.stem in names:
-            began = time.monotonic()
-            make(path)
-            print(f"{path.name}: {time.monotonic() - began:.1f} s", flush=True)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+    return f"{nbformat.writes(notebook)}\n"
