@@ -124,8 +124,11 @@ class OwnController(Model):
         """What it keeps that no state can hold; empty where all can be saved."""
         of_file, of_object = self._places()
         kind = type(getattr(self.work, "__self__", self.work))
-        if getattr(self.work, "__closure__", None):
+        body = getattr(self.work, "__func__", self.work)
+        if getattr(body, "__closure__", None):
             return "values of the function around it"
+        if inspect.isfunction(body) and (vars(body) or body.__defaults__):
+            return "attributes or defaults of a function"
         if not of_file or any(getattr(one, "__slots__", ()) for one in kind.__mro__[:-1]):
             return f"what an object of type {kind.__name__} hides"
         others = {name: one for name, one in of_file.items()

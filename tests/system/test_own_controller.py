@@ -135,6 +135,22 @@ def test_a_state_has_what_the_file_and_the_object_keep(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("def PI(inputs, time, step, past=[]):\n    {}", "attributes or defaults of a function"),
+        ("def PI(inputs, time, step):\n    {}\n\nPI.past = 0",
+         "attributes or defaults of a function"),
+        ("import random\nnoise = random.Random(1)\n\ndef PI(inputs, time, step):\n    {}",
+         "noise, of type Random"),
+        ("import math\nGAIN = 0.5\n\ndef PI(inputs, time, step):\n    {}", ""),
+    ],
+)  # fmt: skip
+def test_what_no_state_can_hold_is_named(text, kept, written):
+    send = "return {'force_command': 0, 'pressure_command': 2e6, 'percussion_on': True}"
+    assert written("PI", text.format(send))[1] == kept
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("class PI:\n    pass", "cannot be called with inputs, time and step"),
