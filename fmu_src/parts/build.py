@@ -15,6 +15,7 @@ from fmu_src.parts import (
     rig_feed,
     rock_profile,
     supply,
+    wave_string,
 )
 from fmu_src.parts import own_controller as own
 from fmu_src.parts.part import COUNT, PartTable
@@ -32,7 +33,7 @@ STOP_TIME, STEP_SIZE = 4.0, 1e-3
 # Parts of a drilling system, by the name of their FMU.
 PARTS = {
     module.TABLE.name: module.TABLE
-    for module in (drill_string, rig_feed, supply, rock_profile, controller)
+    for module in (drill_string, wave_string, rig_feed, supply, rock_profile, controller)
 }
 
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
-from fmu_src.parts.string_body import Lumps
+from fmu_src.parts.string_body import Lumps, TakesRods
 from fmu_src.parts.string_waves import Waves
 
 # Damping by stiffness and step: 3/2 is the limit, the rest is margin.
@@ -36,7 +36,7 @@ LONGEST_LUMPED_STEP = 2e-3
 MOST_RODS = 2000
 
 
-class DrillString(Model):
+class DrillString(TakesRods, Model):
     """String with shoulder.
 
     Attributes
@@ -183,18 +183,6 @@ class DrillString(Model):
             self.force = 0.0
             return
         self.force = max(0.0, k * compression + c * (self.body.casing_velocity - bit_velocity))
-
-    def _add_rods(self, asked: bool) -> None:
-        """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""
-        wanted = self.body.head >= self.next_rod
-        if wanted and (self.parameters["rod.automatic"] or (asked and not self.was_asked)):
-            before = self.body.stored, self.body.momentum
-            self.body.add_rod()
-            self.added += 1
-            self.next_rod += self.parameters["rod.length"]
-            self.brought_energy += self.body.stored - before[0]
-            self.brought_momentum += self.body.momentum - before[1]
-        self.was_asked = bool(asked)
 
     def signals(self) -> dict[str, Any]:
         """What rig, rock, hammer and controller take."""

@@ -48,7 +48,7 @@ class Rods:
         buoyancy = p["fluid_density"] / self.density
         self.gravity = p["gravity"] * (1.0 - buoyancy)  # of what is in the hole
         self.head_gravity = p["gravity"]
-        self.head_mass, self.casing_mass = p["head.mass"], p["casing.mass"]
+        self.head_mass, self.casing_mass = p["head.mass"], p.get("casing.mass", 0.0)
         self.sticking = p["friction.force"]  # by length [N/m]
         self.viscous = p["friction.viscosity"]  # by length [N s/m2]
         self.head = self.casing = self.head_velocity = self.casing_velocity = 0.0
@@ -72,6 +72,42 @@ class Rods:
         """Weight of head, rods and casing, less buoyancy [N]."""
         rods = self.density * self.area * self.length_of_rod * self.count
         return self.head_gravity * self.head_mass + self.gravity * (rods + self.casing_mass)
+
+
+class TakesRods:
+    """A model of a string whose body gets more rods as it goes down.
+
+    Attributes
+    ----------
+    added : int
+        Rods since the start.
+    next_rod : float
+        Displacement of the head at which the next one is wanted [m].
+    was_asked : bool
+        Whether one was asked for in the step before.
+    brought_energy, brought_momentum : float
+        Of new rods [J, N s].
+    """
+
+    parameters: dict[str, Any]
+    body: Any
+    added: int
+    next_rod: float
+    was_asked: bool
+    brought_energy: float
+    brought_momentum: float
+
+    def _add_rods(self, asked: bool) -> None:
+        """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""
+        wanted = self.body.head >= self.next_rod
+        if wanted and (self.parameters["rod.automatic"] or (asked and not self.was_asked)):
+            before = self.body.stored, self.body.momentum
+            self.body.add_rod()
+            self.added += 1
+            self.next_rod += self.parameters["rod.length"]
+            self.brought_energy += self.body.stored - before[0]
+            self.brought_momentum += self.body.momentum - before[1]
+        self.was_asked = bool(asked)
 
 
 class Lumps(Rods):

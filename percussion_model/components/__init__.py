@@ -87,6 +87,8 @@ class Component(NamedTuple):
         and it sets `s.armed` where the next closure of the gap begins a blow.
     is_throttled : bool
         A drive that has less where the casing lifts off: it asks `throttle` of physics/feed.py.
+    takes_feed : bool
+        The feed acts on a body of it, `s.feed`, and no longer on the bit.
     lasts : kernel or None
         lasts(par, s) -> time above 0 for which its mean forces may be taken as constant [s].
         Without it modes make no leaps.
@@ -121,6 +123,7 @@ class Component(NamedTuple):
     stores: bool = False
     loading: Callable[..., tuple[float, float, float]] | None = None
     is_throttled: bool = False
+    takes_feed: bool = False
 
     @property
     def fields(self) -> tuple[str, ...]:

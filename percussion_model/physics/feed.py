@@ -50,6 +50,8 @@ def throttle(par, s):
 @inlined
 def feed_on_bit(par, s):
     """Feed force on the bit [N]."""
+    if par.feed_taken == 1:
+        return 0.0
     if par.on_casing == 0:
         return s.feed
     return max(held(par, s) - full_recoil(par, s), 0.0)

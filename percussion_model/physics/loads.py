@@ -65,6 +65,11 @@ def _nothing(par: Any, s: Any, amount: float) -> None:
     pass
 
 
+@composed
+def _path_of_bit(par: Any, s: Any, path: float) -> None:
+    s.path_b += path
+
+
 def _and_force(before: Callable, one: Component, body: str) -> Callable:
     force = getattr(one, f"on_{body}")
     if force is None:
@@ -134,7 +139,7 @@ hold_on_bit = _joined(_no_force, _and_force, "bit")
 hold_on_piston = _joined(_no_force, _and_force, "piston")
 
 # book_...(par, s, path): enter what the held forces take from a body over a path [m].
-book_on_bit = _joined(_nothing, _and_work, "bit")
+book_on_bit = _joined(_path_of_bit, _and_work, "bit")
 book_on_piston = _joined(_nothing, _and_work, "piston")
 
 # pass_own_time(par, s, h): take the states of components on by h [s].

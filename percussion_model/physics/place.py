@@ -18,6 +18,27 @@ from percussion_model.physics.rock import is_loading, leave_pit, pressed_depth
 
 
 @composed
+def _no_push(s: Any) -> float:
+    return 0.0
+
+
+def _and_push(before: Callable, one: Component) -> Callable:
+    held = f"f_{one.name}_bit"
+
+    @composed
+    def add(s: Any) -> float:
+        return before(s) + s[held]
+
+    return add if one.takes_feed else before
+
+
+# passed_on(s): force on the bit of components that take the feed [N].
+passed_on: Callable = _no_push
+for _one in COMPONENTS:
+    passed_on = _and_push(passed_on, _one)
+
+
+@composed
 def _nothing_kept(par: Any, s: Any, period: float) -> float:
     return 0.0
 
@@ -113,6 +134,8 @@ def move_place(par, s, time):
     push = (given - s.place_drive) / max(period, LEAST_DIVISOR)
     s.place_time, s.place_drive = time, given
     feed = feed_on_bit(par, s)
+    if par.feed_taken == 1:
+        feed = passed_on(s)
     if par.on_casing == 1:
         note_recoil(par, s, push)
     if par.places == 0:

@@ -39,6 +39,7 @@ COMMON_PARAMETERS = [
     ("release", "i8"),  # 1: standstill leaves to free flight when F_R reaches 0
     ("throttled", "i8"),  # a Throttled
     ("on_casing", "i8"),  # 1: feed acts on the casing
+    ("feed_taken", "i8"),  # 1: or on the body of a component
     ("casing_weight", "f8"),  # [N]
     ("hole_area", "f8"),  # [m2], 0 where it is not known
     ("places", "i8"),  # 1: from blow to blow the bit climbs out of its craters, or turns
@@ -112,6 +113,7 @@ _MOTION = [
     ("v_b", "f8"),
     ("u_r", "f8"),  # relative mean displacement of the pressure law [m]
     ("path_p", "f8"),  # of the piston's mean, where components act [m]
+    ("path_b", "f8"),  # of the bit's
     ("t_open", "f8"),  # when the gap opened last [s]
     ("t_standstill", "f8"),  # when standstill began [s]
     ("watched_energy", "f8"),  # of the bit's motion, when that was last compared with W_R [J]

@@ -113,6 +113,7 @@ def _component(one: Component) -> Callable:
     pushes, moves = len(one.pushes) > 0, setup.follows_blows(one)
     steps, loads = pushes and one.lasts is None, one.loading is not None
     is_throttled, supply = one.is_throttled, Throttled.SUPPLY.value
+    takes_feed = one.takes_feed
     numbers = _all([_number(name, name) for name in (f"{one.name}_{of}" for of in one.parameters)])
 
     @composed
@@ -120,6 +121,8 @@ def _component(one: Component) -> Callable:
         p[present] = 1
         if is_throttled:
             p["throttled"] = supply
+        if takes_feed:
+            p["feed_taken"] = 1
         if pushes:
             p["effects"] = 1
         if steps:

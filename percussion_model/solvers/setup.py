@@ -137,6 +137,8 @@ def fill_components(p: Any, values: Any) -> None:
             p[f"with_{one.name}"] = 1
             if one.is_throttled:
                 p["throttled"] = Throttled.SUPPLY
+            if one.takes_feed:
+                p["feed_taken"] = 1
             if one.pushes:
                 p["effects"] = 1
                 if one.lasts is None:

@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 from models import make_model, start_inputs
 
-from fmu_src.parts.build import PARTS, part_variables
+from fmu_src.parts.build import PARTS, build_part, part_variables
 from fmu_src.units import UNITS
 from percussion_model.physics.gas import AIR
 from scenarios.harness import Instance
@@ -23,8 +23,12 @@ SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.
 
 
 @pytest.fixture(scope="module")
-def files(fmus):
-    return {path.stem: path for path in fmus.values() if path.stem in PARTS}
+def files(fmus, tmp_path_factory):
+    found = {path.stem: path for path in fmus.values() if path.stem in PARTS}
+    for name in {*PARTS} - {*found}:
+        found[name] = tmp_path_factory.mktemp("other") / f"{name}.fmu"
+        build_part(PARTS[name], found[name])
+    return found
 
 
 def drive(instance, steps=40, begin=0):
