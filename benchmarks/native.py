@@ -33,7 +33,7 @@ def native(runs: int) -> dict[str, Any]:
         `empty`, `empty_read`: a step in which nothing happens, without and with a reading of
         all Real outputs [ns]; `step_first`, `step_least`: median, 99.9 % and greatest time of
         a step [ns] in the first run, and of the least over the runs; `step_worst`: ends of the
-        dearest steps [s] and their least times [ns]; `read_...`: the same with all Real outputs
+        costliest steps [s] and their least times [ns]; `read_...`: the same with all Real outputs
         read; `none`, `few`, `all`: simulated time by time in fmpy.
     """
     from fmpy import extract, read_model_description

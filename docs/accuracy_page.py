@@ -288,7 +288,7 @@ def points_map() -> str:
     ]
     head = ["method", "core-seconds for the map", "median error", "greatest", "above 1 %"]
     return table(head, rows) + (
-        f"\n\n{tree['points']} points, {tree['left_out']} of them left out because their blows are "
+        f"\n\n{tree['points']} points, {tree['left_out']} of them omitted because their blows are "
         f"not alike or the two references differ by more than {percent(tree['most_apart'])}; "
         f"median bar of the reference {power(tree['bar'])}."
     )
@@ -413,7 +413,7 @@ From {made}.
 
 ## All rungs
 
-{what}; ± half the range of repeated times; "within" the bar of the reference, which tells no more.
+{what}; ± half the range of repeated times; "within" the bar of the reference, which shows no more.
 
 {rungs(study)}
 """

@@ -23,7 +23,7 @@ PARAMETERS = {
     "drive.force": "drive force $F_0$",
     "drive.reversal_distance": "reversal distance $D_1$",
     "rock.loading_stiffness": "loading stiffness $K_R$",
-    "rock.unloading_ratio": "unloading ratio $\\gamma$",
+    "rock.unloading_ratio": "unloading / loading stiffness $\\gamma$",
     "rock.barrier_damping": "barrier damping $C_R$",
     "rock.barrier_energy": "barrier energy $W_R$",
     "loss.time": "loss time $\\eta$",

@@ -77,7 +77,7 @@ def describe(both: dict[str, Any], settle: float) -> str:
     lines.append(
         f"{counts[0]} and {counts[1]} whole blows; the difference is the greatest over all of "
         f"them. FMU {both['seconds'][0]:.1f} s, library {both['seconds'][1]:.1f} s. "
-        f"With the error of grid and scatter the rate is {both['rate']} mm/s."
+        f"With discretisation error and scatter the rate is {both['rate']} mm/s."
     )
     return "\n".join(lines)
 

@@ -40,8 +40,8 @@ blow are those of one blow. Where all blows are alike that is the mean. Where th
 (aperiodic motion) it is one draw, which may be off the mean by more than the mean itself: take
 the rise of <code>hole_depth</code> over many blows, from one rise of <code>blow_count</code> to
 another, and its scatter from stretch to stretch as the error.</p>
-<p>The command <code>percussion run</code> with the scene below tells the mean rate ± its error, of
-grid and scatter, for constant inputs.</p>
+<p>The command <code>percussion run</code> with the scene below shows the mean rate ± its error, of
+discretisation and scatter, for constant inputs.</p>
 """
 
 
@@ -89,11 +89,15 @@ def _errors(scene: Scene) -> str:
         grid = (
             f"The solver is {name}, with {'its own number of' if count is None else count} {what}"
         )
-        grid += " in the piston, or in the bit alone: rates are off by what such a grid leaves."
+        grid += (
+            " in the piston, or in the bit alone: rates have the discretisation error of so many."
+        )
         if name != "fem" and scene.solver.accuracy is not None:
             grid += f" solver.accuracy = {scene.solver.accuracy:g} asks for a relative error."
     else:
-        grid = "Rigid bodies go from event to event in closed form: there is no error of a grid."
+        grid = (
+            "Rigid bodies go from event to event in closed form: there is no discretisation error."
+        )
     return ERRORS.format(grid=escape(grid))
 
 

@@ -172,7 +172,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
         shoulder = [100.0 * row.shoulder for row in chosen]
         for values, colour, mark, words in (
             (change, "#0072B2", "o", "change of the rate"),
-            (shoulder, "#D55E00", "s", "energy of the shoulder by that of the blows"),
+            (shoulder, "#D55E00", "s", "energy of the shoulder divided by that of the blows"),
         ):
             axes[2].semilogx(steps, values, color=colour, linestyle=dashes, marker=mark, ms=4,
                              label=f"{words}, {NAMES[order]}")  # fmt: skip

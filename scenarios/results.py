@@ -107,10 +107,10 @@ def _run(
     command = f"python -m {__package__}.{name}"
     parser = _Parser(prog=command, description=about.partition(": `python -m")[0] + ".")
     for k, one in enumerate(archives):
-        words = f"left out: dist/{one.default.name}" + (", made if need be" if one.make else "")
+        words = f"default: dist/{one.default.name}" + (", made if need be" if one.make else "")
         parser.add_argument(f"archive{k}", nargs="?", type=Path, metavar=one.metavar, help=words)
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help=f"folder of the results; left out: {FOLDER / name}"
+        "--out", type=Path, metavar="DIR", help=f"folder of the results; default: {FOLDER / name}"
     )
     parser.add_argument("--force", action="store_true", help="replace what else is in it")
     words = parser.parse_args(arguments)

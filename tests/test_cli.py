@@ -167,8 +167,8 @@ def test_explain_shows_no_rounding_as_an_error_of_the_wave_speed(percussion):
 
 
 def test_explain_promises_runs_for_the_error_only_where_there_are_any(percussion):
-    wave, promise = SCENARIOS / "reference.toml", "the short runs that tell its error come on top"
-    rigid = "no short runs on top, since there are no cells whose error they would tell"
+    wave, promise = SCENARIOS / "reference.toml", "the short runs that show its error come on top"
+    rigid = "no short runs on top, since there are no cells whose error they would show"
     undamped = "without loss its error by the cells is not known, and no run looks for it"
     for words, said in (
         ([wave], promise),

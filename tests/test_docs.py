@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from docs import make
+from docs import make, words
 from docs.blocks import renewed
 from docs.pages import parameters
 from percussion_model import Scene
@@ -152,6 +152,20 @@ def test_all_prose_by_hand_is_short():
     row = re.compile(r"^\s*\|.*$", re.MULTILINE)
     texts = [row.sub("", page.read_text(encoding="utf-8")) for page in pages]
     assert sum(map(words_by_hand, texts)) <= 25_000
+
+
+def test_no_banned_word_is_read_by_users():
+    assert not words.banned(), "docs/developers/style.md has better ones"
+
+
+@pytest.mark.parametrize("pair", range(10))
+def test_the_style_page_has_ten_pairs_that_the_check_separates(pair):
+    page = (ROOT / "docs" / "developers" / "style.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (.+) \| (.+) \|$", page, re.MULTILINE)[1:]
+    assert len(rows) == 10
+    bad, good = rows[pair]
+    assert words.BANNED_WORDS.search(bad)
+    assert not words.BANNED_WORDS.search(good)
 
 
 def test_pictures_are_small():

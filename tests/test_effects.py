@@ -244,7 +244,7 @@ def test_a_dearer_step_is_marked_where_something_was_turned_off(rigid, capsys):
     assert study.to_dict()["effects"][0]["step_dearer"]
     assert table_of(study)[1][1][1].endswith("*")
     show_effects(study)
-    assert "*: turning the effect off made a time step dearer" in capsys.readouterr().out
+    assert "*: turning the effect off made a time step costlier" in capsys.readouterr().out
     assert not study.is_costlier(replace(trial, step=0.99 * NOISE * 1e-7))
     assert not study.is_costlier(replace(trial, variant=tension))
     assert not study.is_costlier(replace(trial, step=None))

@@ -225,7 +225,7 @@ def test_a_curve_alone_says_that_it_tells_nothing_of_the_barrier(tmp_path):
     bit().to_toml(tmp_path / "scene.toml")
     ended = CliRunner().invoke(app, ["calibrate", str(tmp_path / "scene.toml"), "--curve", slow])
     shown = " ".join(ended.output.split())
-    assert "C_R = 1e+04 N s/m, W_R = 0.05 J kept: a slow test does not tell them" in shown
+    assert "C_R = 1e+04 N s/m, W_R = 0.05 J kept: a slow test does not determine them" in shown
     assert "hold only if" not in shown
 
 

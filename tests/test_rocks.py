@@ -86,7 +86,9 @@ def test_fitted_numbers_are_those_of_the_validation(name):
     title, fit = FITS[name]
     text = (ROOT / "docs" / "validation.md").read_text("utf-8").partition(f"### {title}\n")[2]
     found = re.search(
-        rf"fit {fit}\*\*: loading stiffness ([\d.]+) ± [\d.]+ kN/mm; unloading ratio ([\d.]+)", text
+        rf"fit {fit}\*\*: loading stiffness ([\d.]+) ± [\d.]+ kN/mm; "
+        r"unloading / loading stiffness ([\d.]+)",
+        text,
     )
     stiffness, ratio = map(float, found.groups())
     assert rock(name).number(STIFFNESS).value == pytest.approx(1e6 * stiffness, rel=1e-3)

@@ -116,7 +116,7 @@ def test_a_settled_rate_has_the_error_of_its_grid():
         assert coarse_numbers[f"{name}_error"] < off < numbers[f"{name}_error"]
     assert judged.rate_of_penetration == coarse.rate_of_penetration
     assert len(judged.blows) == len(coarse.blows)
-    assert judged.summary()["rate_of_penetration_error_of"] == "grid and convergence"
+    assert judged.summary()["rate_of_penetration_error_of"] == "discretisation and convergence"
     # where it was not estimated, that is told
     assert coarse.summary()["rate_of_penetration_error_of"] == "convergence"
     assert coarse.summary()["grid_errors"] == {}
@@ -136,7 +136,7 @@ def test_a_deviation_has_the_error_of_convergence_and_grid(capsys):
     off = abs(coarse.multiplier - fine.multiplier)
     assert off <= coarse.multiplier_error < 0.1 * coarse.multiplier
     show_settled(coarse)
-    (line,) = [one for one in capsys.readouterr().out.splitlines() if "Deviation" in one]
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "Stability multiplier" in one]
     assert f"{coarse.multiplier:.3f} ± {coarse.multiplier_error:.3f}" in line
     rigid = settled(Scene().replace(**RIGID), error_estimate=True)
     assert rigid.others == ()
@@ -153,7 +153,7 @@ def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
     show_settled(found)
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "not the same on a second resolution: aperiodic" in shown
-    assert "Deviation after a cycle undecided, at this resolution" in shown
+    assert "Stability multiplier undecided, at this resolution" in shown
     show_settled(settled(chatter(24)))
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "on no second resolution tried" in shown

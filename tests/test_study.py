@@ -91,7 +91,7 @@ def test_a_study_becomes_tables_and_grids(whole, tmp_path):
     numbers = frame.drop(columns="failure")
     pandas.testing.assert_frame_equal(text, numbers, check_dtype=False, rtol=1e-15)
     assert frame.equals(whole.to_pandas())
-    assert "that of the grid is not estimated" in frame.attrs["errors"]
+    assert "the discretisation error is not estimated" in frame.attrs["errors"]
     with xarray.open_dataset(netcdf) as data:
         assert data.rate_of_penetration.dims == ("feed.force", "rock.loading_stiffness")
         assert data.rate_of_penetration.attrs["units"] == "m/s"
@@ -188,7 +188,7 @@ def test_a_rate_has_its_error_where_that_shows(whole):
     )
     rows["rate_of_penetration_error"] = 2e-4
     assert made.rate_text(0) == "12.35 ± 0.20 mm/s"
-    assert "nor are those of the other numbers" in told["These errors"]
+    assert "nor are errors of the other numbers" in told["These errors"]
 
 
 def test_motions_that_are_counted_are_said_to_be_those_of_one_grid(whole):
@@ -199,7 +199,7 @@ def test_motions_that_are_counted_are_said_to_be_those_of_one_grid(whole):
     for solver in ("wave", "fem"):
         of_grid = told(Scene().computed_by(solver))
         assert of_grid["Points"] == told(SCENE)["Points"]
-        assert of_grid["These motions"].startswith("are those of one grid")
+        assert of_grid["These motions"].startswith("were found with one discretisation")
 
 
 def test_an_interrupted_study_goes_on_where_it_was(whole, tmp_path):

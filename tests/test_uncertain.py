@@ -118,7 +118,7 @@ def test_zeros_that_are_known_are_shown():
 
 def test_large_shares_have_no_exponent():
     (said,) = _large_error(Estimate(grid=7.5, scatter=0.0, floor=0.0), "wave")
-    assert f"{LARGE} 750 %, as coarser runs tell" in said
+    assert f"{LARGE} 750 %, as coarser runs show" in said
     (said,) = numerical_note(1.0, "wave")
     assert said.startswith("100 % of the energy put in is taken")
     (found,) = _jump("bit.position", 1.1, 1e-3)
@@ -395,7 +395,7 @@ def test_what_is_said_of_errors_is_that_of_the_solvers(periodic, aperiodic, caps
     show_comparison(Comparison({"rigid": periodic}))
     shown = capsys.readouterr().out
     assert "Rigid bodies have no cells" in shown
-    assert "by the resolution and" not in shown
+    assert "by discretisation and" not in shown
     assert "stands before a difference" not in shown
 
 

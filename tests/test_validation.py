@@ -278,7 +278,7 @@ def test_the_bilinear_law_has_no_speed_of_its_own(kuru):
 def test_one_unloading_ratio_cannot_be_at_two_speeds(found):
     needed = [
         found.found("single_insert_kuru", name)
-        for name in ("to 9 m/s", "unloading ratio to 11 m/s")
+        for name in ("to 9 m/s", "unloading stiffness to 11 m/s")
     ]
     low, high = (one.values[RATIO] for one in needed)
     errors = [one.errors[RATIO] for one in needed]

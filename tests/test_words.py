@@ -90,7 +90,7 @@ def test_a_fall_has_the_errors_of_its_grid(drop, capsys):
     for name in ("Depth of the bit's end in the rock", "First contact", "Energy to crush rock"):
         (line,) = [text for text in shown.splitlines() if name in text]
         assert "±" in line
-    assert "by the resolution; without it" in " ".join(shown.split())
+    assert "discretisation error; without it" in " ".join(shown.split())
     # rigid bodies have no grid
     exact = simulate(DROP.computed_by("rigid", **{"piston.model": "absent"}))
     assert set(exact.errors.values()) == {0.0}
@@ -128,7 +128,7 @@ def test_rigid_bodies_are_said_to_have_no_cells(capsys):
     show_summary(simulate(RIGID, 1.0, settle=0.5))
     shown = " ".join(capsys.readouterr().out.split())
     assert "Rigid bodies have no cells" in shown
-    assert "by the resolution" not in shown
+    assert "discretisation" not in shown
     assert "How far rigid bodies are from real ones" in shown
 
 
@@ -145,7 +145,7 @@ def test_settled_names_the_time_that_was_simulated_and_the_error_of_its_rate(cap
     show_settled(found)
     shown = capsys.readouterr().out
     assert "Multiplier" not in shown
-    assert re.search(r"Deviation after a cycle +│ -?[\d.]+ ± [\d.]+ of what it was", shown)
+    assert re.search(r"Stability multiplier +│ -?[\d.]+ ± [\d.]+ *│", shown)
     assert f"{len(found.blows)} in {found.duration:.4g} s of simulated time" in shown
     assert re.search(r"Rate of penetration +│ 16\.\d+ ± 0\.0\d+ mm/s", shown)
 

@@ -17,7 +17,7 @@ def default(row: ParameterRow) -> str:
     if row.required:
         return "required"
     if row.default is None:
-        return "left out"
+        return "not set"
     if row.kind == "sections":
         return "one, as in the reference scene"
     if row.kind == "rods":

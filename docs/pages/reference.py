@@ -26,7 +26,8 @@ STUDY_ONLY = (
     Column("wall_time", "s", "computing time of the point"),
 )
 OF_THE_CYCLE = {
-    "multiplier": "what is left of a deviation after one cycle; below 1 the cycle is stable",
+    "multiplier": "stability multiplier: share of a deviation left after one cycle; below 1: "
+    "stable",
 }
 
 
@@ -60,7 +61,7 @@ def outputs() -> str:
         "Samples": "`trace.csv` or `trace.npz` (`--trace`), `Result.trace`, "
         f"`Simulation.observe()`. Modes of the rock law: {numbers(Mode)}.\n\n"
         + listed(SAMPLE_COLUMNS),
-        "Energy ledger": "`energy` in a summary. [The model, section 8](../model.md) tells how "
+        "Energy ledger": "`energy` in a summary. [The model, section 8](../model.md) shows how "
         "the entries add up.\n\n" + listed(ENERGY_COLUMNS),
         "Points of a study": "`points.csv`, `points.nc` and, with pyarrow, `points.parquet` of "
         "`percussion study`, beside the parameters that vary.\n\n" + listed(study_columns()),

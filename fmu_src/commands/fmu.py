@@ -19,7 +19,7 @@ def fmu(
             "-o",
             "--output",
             metavar="FILE.fmu",
-            help="The FMU to write; left out: by the scene's name, in dist.",
+            help="The FMU to write. Default: named after the scene, in dist.",
         ),
     ] = None,
     platforms: Annotated[
@@ -27,7 +27,10 @@ def fmu(
         typer.Option(
             "--platforms",
             metavar="NAMES",
-            help="Bring native libraries for linux64,win64 along; left out: for this one.",
+            help=(
+                "Platforms whose native libraries are included, as linux64,win64. Default: "
+                "this one."
+            ),
         ),
     ] = None,
     no_reference: Annotated[

@@ -21,7 +21,7 @@ def native(
         typer.Option(
             "--platforms",
             metavar="NAMES",
-            help="Processors and systems, as linux64,win64,aarch64-linux; left out: this one.",
+            help="Processors and systems, as linux64,win64,aarch64-linux. Default: this one.",
         ),
     ] = None,
     flat_names: options.FlatNames = False,

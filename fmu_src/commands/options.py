@@ -19,7 +19,7 @@ REFERENCE = Path("reference")
 
 Baked = Annotated[
     Path | None,
-    typer.Argument(metavar="SCENE", help="A scene file, or a preset; left out: reference."),
+    typer.Argument(metavar="SCENE", help="A scene file, or a preset. Default: reference."),
 ]
 # How `build.py fmu` and `build.py native` have named it from the first.
 BakedToo = Annotated[Path | None, typer.Option("--scene", hidden=True)]

@@ -19,11 +19,11 @@ SETTINGS = {"ignore_unknown_options": True, "allow_interspersed_args": False}
 
 def scenario(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="One of them; left out: lists all.")
+        str | None, typer.Argument(metavar="NAME", help="One of them. Default: a list of all.")
     ] = None,
     words: Annotated[
         list[str] | None,
-        typer.Argument(metavar="WORDS", help="Of that scenario; --help after NAME tells."),
+        typer.Argument(metavar="WORDS", help="Arguments of that scenario: see --help after NAME."),
     ] = None,
 ) -> None:
     """Run a scripted scenario of FMUs, as layered rock, or list them."""

@@ -21,7 +21,7 @@ def system(
         typer.Argument(
             metavar="SYSTEM",
             help="Files (TOML), presets, as FeedControlRigid, or the word all for all presets; "
-            "left out: lists them.",
+            "default: a list of them.",
         ),
     ] = None,
     output: Annotated[

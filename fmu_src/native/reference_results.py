@@ -54,7 +54,7 @@ Each experiment of extra/{name}/{experiments} has its inputs in <name>_in.csv an
 outputs at each communication point in <name>_ref.csv. Inputs are set at the start of a
 communication step and held over it; between two lines of a file numbers go straight, and
 flags stay as they are. Outputs have {digits} digits, of which processors and systems may give
-the last ones otherwise; {noise} is left out, for it is nothing else. {scene} is the scene that
+the last ones otherwise; {noise} is omitted, for it is nothing else. {scene} is the scene that
 is baked in.
 """
 

@@ -260,7 +260,7 @@ TABLE = PartTable(
     outputs={
         "feed_force": ("N", "force of the shoulder on the bit, held for the next step"),
         "feed_force_mean": ("N", "the same, filtered"),
-        "head_position": ("m", "displacement of the head, new rods left out of account"),
+        "head_position": ("m", "displacement of the head, without that of adding rods"),
         "head_velocity": ("m/s", "velocity of the head"),
         "casing_position": ("m", "displacement of the casing"),
         "casing_velocity": ("m/s", "velocity of the casing"),

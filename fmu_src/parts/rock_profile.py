@@ -126,7 +126,7 @@ _LAYER = {
     "top": ("m", -1.0, 2e4, "depth at which the layer begins (-1: no such layer)"),
     "loading_stiffness": ("N/m", 1e3, 1e13, "loading stiffness K_R"),
     "unloading_ratio": ("1", 1.0, 1e4, "gamma: unloading by loading stiffness"),
-    "torque_factor": ("1", 0.0, 100.0, "torque on the rotation, by that of sound rock"),
+    "torque_factor": ("1", 0.0, 100.0, "torque on the rotation, divided by that of sound rock"),
 }
 _LAYER_START = {
     "top": -1.0, "loading_stiffness": 7.5e8, "unloading_ratio": 5.0, "torque_factor": 1.0,

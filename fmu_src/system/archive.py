@@ -113,7 +113,7 @@ def _check_entries(path: Path, found: dict[str, Any]) -> None:
                 "letters, digits and underlines, 100 in all"
             )
     if (word := found.get("fidelity", "wave")) != "wave":
-        said = f'{path}: fidelity = {show_value(word)}: must be "wave", or be left out'
+        said = f'{path}: fidelity = {show_value(word)}: must be "wave", or be omitted'
         raise SystemPlanError(said + remark("solver.fidelity"))
     if unprintable(found["description"]):
         raise SystemPlanError(f"{path}: description has a control character")

@@ -281,7 +281,8 @@ class VariantRun:
             reasons += [text for text in self.result.warnings if "whole blow" in text][:1]
         elif self.undecided and not reasons:
             reasons += [
-                "the motion is aperiodic, and the run too short to tell its rate of penetration"
+                "the motion is aperiodic, and the run too short to determine its rate of "
+                "penetration"
             ]
         return reasons
 

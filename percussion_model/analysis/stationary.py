@@ -84,8 +84,8 @@ class Settled:
         Part of the rate's error [m/s]. Periodic: bound of what convergence would still
         change, or the scatter of the cycles. Aperiodic: the standard error.
     multiplier : float
-        What is left of a deviation after one cycle, from the ratio of the last
-        two changes; negative where it alternates. The cycle is stable below 1
+        Stability multiplier: what is left of a deviation after one cycle, from the
+        ratio of the last two changes; negative where it alternates. The cycle is stable below 1
         in size. Its error is `multiplier_error`.
     cycle : ndarray of BLOW
         The last cycle; no rows where the motion is not periodic.
@@ -147,7 +147,9 @@ class Settled:
         if math.isnan(self.settling_error):
             return ""
         settling = "scatter" if math.isnan(self.multiplier) else "convergence"
-        return f"grid and {settling}" if self.grid_errors.get(_RATE, 0.0) > 0.0 else settling
+        return (
+            f"discretisation and {settling}" if self.grid_errors.get(_RATE, 0.0) > 0.0 else settling
+        )
 
     @property
     def rate_of_penetration_undecided(self) -> bool:

@@ -218,12 +218,12 @@ class Coupling:
 
     def _refuse_contradictions(self, count: int, tolerance: float | None) -> None:
         if tolerance is not None and self.on_way is not None:
-            raise CouplingError("on_way cannot be taken back with a step: leave the tolerance out")
+            raise CouplingError("on_way cannot be taken back with a step: omit the tolerance")
         if tolerance is not None and self.every:
             slow = ", ".join(f"{name}={steps}" for name, steps in self.every.items())
             raise CouplingError(
                 f"tolerance {tolerance:g} and every {slow} do not go together (--tolerance, "
-                "--every): leave one of them out"
+                "--every): omit one of them"
             )
         refuse_remainder(self.every, self.parts, count)
 

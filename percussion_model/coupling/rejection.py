@@ -50,12 +50,12 @@ class StepControl:
         if unable:
             raise CouplingError(
                 f"{', '.join(unable)}: cannot save and restore a state, which steps that are "
-                "taken back need; leave the tolerance out"
+                "taken back need; omit the tolerance"
             )
         fixed = [port.name for port in ports if not port.part.can_vary]
         if fixed:
             raise CouplingError(
-                f"{', '.join(fixed)}: takes no steps of varying size; leave the tolerance out"
+                f"{', '.join(fixed)}: takes no steps of varying size; omit the tolerance"
             )
         self.ports, self.longest, self.tolerance = list(ports), longest, tolerance
         self.done = self.tried = self.rejected = 0

@@ -210,7 +210,9 @@ def judge_run(
         text = f"{steps} steps are too few to judge by: at least {FEWEST_STEPS} are needed"
     elif not numbers:
         word = "undecided"
-        text = "no part keeps a balance and none exchange real numbers, so nothing can be told"
+        text = (
+            "no part keeps a balance and none exchange real numbers, so nothing can be determined"
+        )
     else:
         word = "balanced"
         size = f"steps of at most {_ms(step)} are" if controlled else f"step of {_ms(step)} is"

@@ -63,7 +63,7 @@ def read_drop(word: str, gauge: float | None = None) -> DropTest:
     _tell_of_others(path, others)
     kept = columns["time"] >= 0.0
     if not kept.all():
-        print_message(f"{path}: {np.sum(~kept)} of {len(kept)} rows are before time 0: left out")
+        print_message(f"{path}: {np.sum(~kept)} of {len(kept)} rows are before time 0: omitted")
     time, values = columns["time"][kept], columns[signals[0]][kept]
     return DropTest(time, values, fast, signals[0], gauge, f"{path.name}@{speed}")
 

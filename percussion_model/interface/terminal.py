@@ -173,7 +173,7 @@ def show_settled(found: Settled) -> None:
         if key != RATE[1] and summary.get(key) is not None:
             table.add_row(one.behind or one.name, _with_driller_unit(summary, key))
     if summary["multiplier"] is not None:
-        table.add_row("Deviation after a cycle", _deviation(found))
+        table.add_row("Stability multiplier", _deviation(found))
     table.add_row("Blows run", f"{len(found.blows)} in {found.duration:.4g} s of simulated time")
     table.add_row("Computed in", f"{in_digits(found.wall_time, TIMED)} s")
     print_table(table)
@@ -201,8 +201,7 @@ def on_other_grids(found: Settled) -> str:
 def _deviation(found: Settled) -> str:
     """What is left of a deviation after a cycle, as far as that is known."""
     value, error = found.multiplier, found.multiplier_error
-    text = of_the_cells(value) if math.isnan(error) else with_error(value, error)
-    return f"{text} of what it was"
+    return of_the_cells(value) if math.isnan(error) else with_error(value, error)
 
 
 def settled_error(found: Settled) -> str:
@@ -210,11 +209,11 @@ def settled_error(found: Settled) -> str:
     settling = "convergence" if found.error_of.endswith("convergence") else "the scatter of blows"
     grid = found.grid_errors.get(RATE[1])
     if grid is None:
-        parts = f"{settling} alone, since that by the resolution was not estimated"
+        parts = f"{settling} alone, since the discretisation error was not estimated"
     elif grid == 0.0:
         parts = f"{settling} alone, since this solver has no grid"
     else:
-        parts = f"the resolution and {settling}"
+        parts = f"discretisation and {settling}"
     return f"± is the numerical error, by {parts}. {NOT_THE_MODEL}"
 
 
@@ -321,8 +320,8 @@ def _cost_of_errors(scene: Scene, solver: Solver) -> str:
     if coarser is None:
         return "; its error is not estimated: no coarser runs are known for this solver"
     if not coarser:
-        return "; no short runs on top, since there are no cells whose error they would tell"
-    return "; the short runs that tell its error come on top"
+        return "; no short runs on top, since there are no cells whose error they would show"
+    return "; the short runs that show its error come on top"
 
 
 # Units that scales are shown in, by SI unit.

@@ -19,7 +19,7 @@ def refuse_joints(scene: Scene) -> None:
             if getattr(rod, name) == rod.rows[name].default:
                 continue  # as a scene that is written in full has it
             raise SceneError(
-                f'string.rods.{k}.{name}: a joint that is "{rod.joint}" has none: leave it out'
+                f'string.rods.{k}.{name}: a joint that is "{rod.joint}" has none: omit it'
             )
 
 
@@ -67,5 +67,5 @@ def _joined(values: Mapping[str, Any], name: str, own: Mapping[str, Any]) -> dic
     group = _group_of(values, name)
     for key in own:
         if key in group:
-            raise SceneError(f"bars and {name}.{key} are both given: leave out one of them")
+            raise SceneError(f"bars and {name}.{key} are both given: omit one of them")
     return {**group, **own}

@@ -48,7 +48,7 @@ _OF_STRING = (
 )
 _OF_RATE = "solver.accuracy = {solver.accuracy!r} is that of the rate of penetration, which "
 _FINER = (
-    "(docs/undamped.md): leave it out and set solver.cells, or set effects.loss = true with "
+    "(docs/undamped.md): omit it and set solver.cells, or set effects.loss = true with "
     "loss.time above 0 s"
 )
 
@@ -72,8 +72,7 @@ TEXTS = {
         'bit.model = "rigid", or another solver.name, as "auto"'
     ),
     Rule.RODS_UNUSED: (
-        "string.rods are given, but effects.string = false: set effects.string = true, or "
-        "leave them out"
+        "string.rods are given, but effects.string = false: set effects.string = true, or omit them"
     ),
     Rule.NO_RODS: "effects.string = true needs string.rods, or [[bars]] from drive to rock",
     Rule.RIGID_BIT_OF_STRING: (
@@ -96,7 +95,7 @@ TEXTS = {
     ),
     Rule.ACCURACY_WITHOUT_PISTON: _OF_RATE
     + (
-        'a bit alone (piston.model = "absent") does not have: leave it out and '
+        'a bit alone (piston.model = "absent") does not have: omit it and '
         "set solver.cells, or give a piston"
     ),
     Rule.ACCURACY_WITHOUT_LOSS: _OF_RATE

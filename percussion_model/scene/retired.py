@@ -6,7 +6,7 @@ Standard library only: every FMU takes this module along.
 from __future__ import annotations
 
 BLOW_MAP = (
-    "the blow map is retired: leave it out, and the default solver takes its place, with an hour "
+    "the blow map is retired: omit it, and the default solver takes its place, with an hour "
     "of drilling in about a minute or less (docs/fidelity.md)"
 )
 CHAIN = 'bars between piston and bit are computed by "wave" as well now'

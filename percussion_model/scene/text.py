@@ -34,7 +34,7 @@ _BARE_WORD = re.compile(r"(?!(?:true|false|inf|nan)$)[A-Za-z][A-Za-z-]*")
 
 _HEADER = (
     "# A scene for `percussion run`. SI units; positions and velocities point down,",
-    "# forces on contact and rock are positive in compression. What is left out takes",
+    "# forces on contact and rock are positive in compression. What is omitted takes",
     "# its default, which is the value of the reference scene.",
 )
 

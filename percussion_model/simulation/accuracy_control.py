@@ -272,6 +272,6 @@ def _missed(result: Result, step: Step | None, wanted: float, error: float) -> s
         return f"{head}, since a bounce comes close to the barrier"
     return (
         f"{head} with {next(iter(result.cells.values()))} "
-        f"{counted(result.solver)}: the rate jumps from grid to grid, since the motion passes "
-        "close by a threshold"
+        f"{counted(result.solver)}: the rate jumps between discretisations, since the motion "
+        "passes close to a threshold"
     )

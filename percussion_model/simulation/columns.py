@@ -83,7 +83,7 @@ SUMMARY_COLUMNS = (
     Column("setup_time", "s", "time to prepare the solver, compilation included"),
     Column("real_time_factor", "", "simulated time divided by computing time"),
     Column("end", "SI", "a sample at the end of the run, by the columns of a trace"),
-    Column("fall", "SI", "what a drop test tells in place of blows"),
+    Column("fall", "SI", "what a drop test gives in place of blows"),
     Column("interrupted", "", "whether Ctrl-C ended the run"),
     Column("solver", "", "name of the solver"),
     Column("title", "", "title of the scene"),

@@ -32,7 +32,7 @@ class DrillerNumber(NamedTuple):
 # By the key of a summary; what each is stands in `SUMMARY_COLUMNS`.
 DRILLER_NUMBERS = {
     "rate_of_penetration": DrillerNumber("Rate of penetration", 3600.0, "m/h", "Rate in an hour"),
-    "blow_frequency": DrillerNumber("Blow frequency", 60.0, "blows/min", "Blows in a minute"),
+    "blow_frequency": DrillerNumber("Blow frequency", 60.0, "blows/min", "Blows per minute"),
     "percussive_power": DrillerNumber("Percussive power", 1e-3, "kW", ""),
     "specific_energy": DrillerNumber("Specific energy", 1e-6, "MJ/m^3", ""),
 }

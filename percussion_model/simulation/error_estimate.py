@@ -491,7 +491,7 @@ def warnings_of_decisions(
     yield (
         f"the rate of penetration {LARGE} {off} %: at a bounce or in a standstill the bit's energy "
         f"is within {within} % of the barrier (rock.barrier_energy) in {len(near)} of {len(blows)} "
-        f"blows, and another resolution may decide otherwise; the rate is {rates} mm/s then"
+        f"blows, and another discretisation may decide otherwise; the rate is {rates} mm/s then"
     )
 
 
@@ -502,7 +502,7 @@ def _large_error(estimate: Estimate, solver: str) -> Iterator[str]:
         remedy = REMEDIES.get(solver, REMEDIES["fem"])
         yield (
             f"the rate of penetration {LARGE} {in_digits(100.0 * by_grid, 2)} %, as coarser "
-            f"runs tell; {remedy}"
+            f"runs show; {remedy}"
         )
 
 

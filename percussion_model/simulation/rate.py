@@ -12,7 +12,7 @@ import numpy as np
 
 from percussion_model.physics.settling import STALLED_PERIODS
 
-# Fewer whole blows than this tell no rate.
+# Fewer whole blows than this give no rate.
 LEAST_BLOWS = 3
 # A rate that is known no better than this, relative to it, deserves a warning.
 LARGE_ERROR = 1e-2

@@ -162,7 +162,7 @@ class Runner:
                 raise SimulationError(
                     f"at t = {self.time:.6g} s, after {before} blows: the run has taken all the "
                     "time that it may (--most-time, most_time) and has not settled: `percussion "
-                    "explain` tells what a blow costs; take fewer cells"
+                    "explain` shows what a blow costs; take fewer cells"
                 )
             status = self.solver.settle(self._state, asked, self._settling)
             self._time = float(one.time)

@@ -118,7 +118,7 @@ class Simulation(Runner):
             raise SimulationError(
                 f"at t = {self.solver.time(self._state):.6g} s the rows of {self.blow_rows} blows "
                 f"and {n_events} events take more than {MOST_ROW_BYTES} bytes: shorten "
-                "run.duration, or leave the events out (record_events = False)"
+                "run.duration, or omit the events (record_events = False)"
             )
 
     @property
@@ -462,7 +462,7 @@ def _requested(
         raise SceneError("run.check = true verifies solver.accuracy: set that too")
     if error_estimate is False and scene.solver.accuracy is not None:
         notes.append(
-            "run.error_estimate = false has no effect: the runs for solver.accuracy tell the error"
+            "run.error_estimate = false has no effect: the runs for solver.accuracy show the error"
         )
     return scene, notes
 

@@ -41,12 +41,12 @@ NOT_ESTIMATED = "error not estimated"
 # What stands below tables of means.
 NOT_THE_MODEL = "Whether model and rock are right is not in it."
 PLUS_MINUS = (
-    "± is the estimated numerical error of this motion, by the resolution and the scatter "
+    "± is the estimated numerical error of this motion, by discretisation and the scatter "
     f"of the blows; without it a mean is known to its four digits. {NOT_THE_MODEL[:-1]}, nor "
     "whether another start leads to another motion."
 )
 PLUS_MINUS_OF_FALL = (
-    "± is the estimated numerical error, by the resolution; without it a number is known "
+    "± is the estimated discretisation error; without it a number is known "
     f"to its four digits. {NOT_THE_MODEL}"
 )
 NOT_RIGID = "How far rigid bodies are from real ones is not in it."
@@ -61,7 +61,7 @@ UNDAMPED = (
     "is known: numbers have that of their scatter, or three digits."
 )
 WITHOUT_ESTIMATE = (
-    "The error by the resolution was not estimated: numbers have that of their scatter, "
+    "The discretisation error was not estimated: numbers have that of their scatter, "
     "or three digits."
 )
 

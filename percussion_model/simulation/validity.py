@@ -73,7 +73,7 @@ def guard_notes(statistics: Mapping[str, int]) -> Iterator[str]:
     if storms:
         yield (
             f"{storms} storm{'s' if storms != 1 else ''} of events: more within a moment than can "
-            "mean anything; rebounds were left out or events postponed: bounded but not exact"
+            "mean anything; rebounds were omitted or events postponed: bounded but not exact"
         )
 
 

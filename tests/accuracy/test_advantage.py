@@ -188,7 +188,7 @@ def test_advice_tells_a_setting_that_is_good_by_luck_apart():
 
 def test_advice_does_not_name_what_the_reference_cannot_tell():
     found = made({"wave": [(1.0, 1e-2), (2.0, 1e-4)]}, bar=2e-3)
-    assert "the reference does not tell: its bar is 0.20 %" in found.advice(1e-3)
+    assert "the reference does not show it: its bar is 0.20 %" in found.advice(1e-3)
     assert "take wave, rung 1" in found.advice(3e-3)
     assert "no method" in made({"wave": [(1.0, 1e-2)]}).advice(1e-3)
 

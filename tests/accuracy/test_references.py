@@ -189,7 +189,7 @@ def test_one_witness_makes_no_reference():
     """As the peak of the contact force where explicit elements refuse a rock law."""
     bar = _agree({"wave": (2.0, 0.1)})
     assert (bar.value, bar.error, bar.agreed, bar.doubt) == (
-        2.0, 0.1, False, "one method alone tells it",
+        2.0, 0.1, False, "one method alone gives it",
     )  # fmt: skip
     assert math.isnan(bar.apart)
     assert _agree({"wave": (2.0, 0.1), "fem": (4.0, 0.1)}).doubt == "the limits disagree"

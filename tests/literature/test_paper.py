@@ -299,7 +299,7 @@ def test_what_a_number_must_meet_to_agree_is_told(waves, drops, capsys):
 
 def test_a_rate_of_a_sweep_has_its_error_where_the_note_says_so(sweeps):
     """Of 4.4: three digits where the error shows in none of them, and the note tells it."""
-    assert "left out up to 0.1 % of a rate" in ERRORS
+    assert "omitted up to 0.1 % of a rate" in ERRORS
     for share, shows in ((9e-4, False), (1.1e-3, True)):
         found = {}
         for name, study in sweeps.items():

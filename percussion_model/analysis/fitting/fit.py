@@ -170,7 +170,8 @@ def fit_rock(
     if both and UNLOADING not in (ranges or {}) and _of_one_peak(sources):
         if parameters is not None:
             raise FitError(
-                f"{UNLOADING}: peaks of about one force do not tell it and {RATIO} both; give a "
+                f"{UNLOADING}: peaks of about one force do not determine it and {RATIO} both; "
+                "give a "
                 "range of it, or fit one of them"
             )
         untold = (UNLOADING,)
@@ -227,7 +228,8 @@ def _chosen(
     if len(names) > len(hammer) == len(sources):
         raise FitError(
             f"{', '.join(one.name for one in hammer)}: no more unknowns than numbers of the hammer "
-            f"can be told, not {', '.join(names)}; name what to fit (--only), or add tests of rock"
+            f"can be determined, not {', '.join(names)}; name what to fit (--only), or add "
+            "tests of rock"
         )
     return names
 

@@ -45,7 +45,7 @@ DETERMINED, RIVALLED = "determined", "rival"
 OPEN_ABOVE, OPEN_BELOW, OPEN = "open above", "open below", "open"
 WIDE = "not determined"
 # The model does not explain the data; a parameter that is not told from an unknown of a sensor.
-MISFIT, UNTOLD = "not explained", "not told apart"
+MISFIT, UNTOLD = "not explained", "not distinguished"
 # Minima are told up to this deviance above the best: less likely by exp(-10).
 TOLD = 20.0
 # Digits of a parameter that is not determined.

@@ -73,8 +73,8 @@ def interval_notes(estimates: Mapping[str, Estimate], like: Likelihood) -> list[
         else:
             width = roughly = f"a factor of {in_digits(one.high / one.low, 2)}"
         told = {
-            OPEN_ABOVE: f"is not determined: the data tell only that it is above {low}",
-            OPEN_BELOW: f"is not determined: the data tell only that it is below {high}",
+            OPEN_ABOVE: f"is not determined: the data show only that it is above {low}",
+            OPEN_BELOW: f"is not determined: the data show only that it is below {high}",
             OPEN: "is not determined: its interval reaches over the whole range that was searched, "
             f"{low} to {high}",
             WIDE: f"is not determined: {width}, {low} to {high}, explains the data",
@@ -102,10 +102,11 @@ def kept_notes(like: Likelihood, slow: bool, untold: Sequence[str] = ()) -> list
     given = [key for key in kept if key not in (*silent, *untold) and like.scene[key] is not None]
     notes = []
     if silent:
-        notes.append(f"{_values_of(like, silent)} kept: a slow test does not tell them")
+        notes.append(f"{_values_of(like, silent)} kept: a slow test does not determine them")
     if untold:
         notes.append(
-            f"{_values_of(like, untold)} kept: peaks of about one force do not tell it, and gamma "
+            f"{_values_of(like, untold)} kept: peaks of about one force do not determine it, "
+            "and gamma "
             "holds at this force only"
         )
     if given:
@@ -297,7 +298,7 @@ def distrusted(
         elif one.determined and name in mixed:
             kept[name] = one._replace(verdict=UNTOLD)
             notes.append(
-                f"{NAMES[name]} ({name}) is not determined: the data do not tell it from "
+                f"{NAMES[name]} ({name}) is not determined: the data do not distinguish it from "
                 f"{mixed[name]}, of which only the prior is known"
             )
     return kept, notes

@@ -75,12 +75,15 @@ LEAST_ERROR = 1e-3
 PER_HOUR = DRILLER_NUMBERS["rate_of_penetration"]
 # What errors there are, behind "those of the rate".
 KNOWN_ERRORS = (
-    "are of convergence and scatter; that of the grid is not estimated, nor are those of the "
-    "other numbers"
+    "are of convergence and scatter; the discretisation error is not estimated, nor are errors of "
+    "the other numbers"
 )
 
 # What is not known of the motions that are counted, of solvers that have a grid.
-OF_ONE_GRID = "are those of one grid; near a threshold another has others (percussion settled)"
+OF_ONE_GRID = (
+    "were found with one discretisation; near a threshold a finer one may give another motion "
+    "(percussion settled checks)"
+)
 
 
 def _error_of(name: str) -> str:

@@ -17,7 +17,7 @@ from percussion_model.scene.units import with_point
 
 __all__ = ["Points", "grid", "latin_hypercube", "read_axis", "table"]
 
-# Scenes that differ in these alone share what is dear to set up (modes and their tables).
+# Scenes that differ in these alone share what is costly to set up (modes and their tables).
 CHEAP_GROUPS = ("feed.", "drive.", "start.", "run.")
 CHEAP_KEYS = ("rock.barrier_energy",)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def accuracy(
     scenes: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SCENE]...", help="Scene files; the reference scene if left out."),
+        typer.Argument(metavar="[SCENE]...", help="Scene files. Default: the reference scene."),
     ] = None,
     full: Annotated[
         bool, typer.Option("--full", help="Finer and costlier rungs too: up to an hour.")
@@ -29,7 +29,7 @@ def accuracy(
         typer.Option(
             "--methods",
             metavar="A,B",
-            help="As modal,fem,exact-flow; left out: all, of several scenes the quick ones.",
+            help="As modal,fem,exact-flow. Default: all; for several scenes, the quick ones.",
         ),
     ] = None,
     make_references: Annotated[

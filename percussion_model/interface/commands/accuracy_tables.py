@@ -134,7 +134,7 @@ def _show_points(found: Study) -> None:
         "repeated times; what has none, and every set-up, was timed once."
     )
     if any(found.floor(key) for key in keys):
-        _say("< Below the bar of the reference, which tells no more.")
+        _say("< Below the bar of the reference, which shows no more.")
 
 
 def _show_orders(found: Study) -> None:

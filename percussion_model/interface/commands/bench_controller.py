@@ -23,7 +23,7 @@ def bench_controller(
         str | None,
         typer.Argument(
             metavar="[FMU|FILE.py:NAME]",
-            help="NAME of a function, a class or a factory. Left out: that of the archive.",
+            help="NAME of a function, a class or a factory. Default: that of the archive.",
         ),
     ] = None,
     system: Annotated[

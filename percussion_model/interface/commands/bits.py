@@ -20,18 +20,19 @@ HEADINGS = (
 MM, RPM = 1e3, 9.549296585513721
 NOTE = (
     "In brackets is the interval that a number is believed to lie in. Counts were read second "
-    "hand; the mean radius of the buttons follows from them. The rule is 300 by the diameter in "
-    "inches. `percussion bits NAME` tells all of one."
+    "hand; the mean radius of the buttons follows from them. The rule is 300 divided by the "
+    "diameter in "
+    "inches. `percussion bits NAME` shows all of one."
 )
 
 
 def bits(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="One of them; left out: lists all.")
+        str | None, typer.Argument(metavar="[NAME]", help="One of them. Default: a list of all.")
     ] = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """List the button bits that --bit takes: diameter, buttons, sources; or tell of one."""
+    """List the button bits that --bit takes: diameter, buttons, sources; or show one."""
     from percussion_model.interface.tables import named_table, print_stored, print_table
     from percussion_model.scene.bits import bit
     from percussion_model.scene.bits import bits as names

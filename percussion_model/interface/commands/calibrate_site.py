@@ -100,7 +100,7 @@ def _settings(scene: Scene, path: Path) -> dict[str, list[float]]:
     if meant := [one for one in others if "." in one]:
         raise FitError(
             f"{path}: {meant[0]} is no parameter that matters in this scene, nor "
-            f"{' or '.join(MEASURED)}: leave it out, or correct its name"
+            f"{' or '.join(MEASURED)}: omit it, or correct its name"
         )
     if others:
         common.print_message(f"{path}: not read: {', '.join(others)}")

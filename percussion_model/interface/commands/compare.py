@@ -17,7 +17,8 @@ def compare(
         typer.Option(
             "--solvers",
             metavar="A,B",
-            help="Solvers, the first to compare with; left out: the scene's own, and modal, "
+            help="Solvers; the first is the one to compare with. Default: the scene's own, "
+            "and modal, "
             "wave, fem and rigid as far as they compute it.",
         ),
     ] = None,

@@ -22,7 +22,7 @@ SHOWN = (
     ("energy,\nJ", "blow_energy", 1.0, ".0f"),
     ("F_0,\nkN", "force", 1e-3, ".3f"),
     ("D_1,\nmm", "reversal_distance", 1e3, ".2f"),
-    ("left out:\nblows, %", "left_out_frequency", 100.0, "+.1f"),
+    ("omitted:\nblows, %", "left_out_frequency", 100.0, "+.1f"),
     ("\nenergy", "left_out_blow_energy", 100.0, "+.1f"),
     ("in rock:\nblows, %", "rock_frequency", 100.0, "+.1f"),
     ("\nenergy", "rock_blow_energy", 100.0, "+.1f"),
@@ -46,7 +46,7 @@ def drive_map(
         typer.Option(
             "--rebounds",
             metavar="A,B,C",
-            help="Velocities after a blow by those before it; default 0.1,0.3,0.5,0.7.",
+            help="Velocities after a blow, divided by those before it; default 0.1,0.3,0.5,0.7.",
         ),
     ] = None,
     settings: common.Settings = None,
@@ -154,7 +154,7 @@ def about(found: DriveMap, feed: float) -> list[str]:
         "own": "by its own",
     }
     notes = [
-        "Errors of the law. Left out: interpolated between the neighbouring rows. In rock: in "
+        "Errors of the law. Omitted: interpolated between the neighbouring rows. In rock: in "
         "place of the chambers, in this scene. *: at the rebound of its rock, interpolated."
     ]
     if worst:

@@ -76,7 +76,7 @@ RATE = "rate_of_penetration"
 # An error below this share of a rate or a depth is not shown.
 LEAST_ERROR = 1e-3
 NOTE = (
-    "± is the numerical error, by the resolution and the scatter of the blows; a rate "
+    "± is the numerical error, by discretisation and the scatter of the blows; a rate "
     "without it is known to 0.1 %. % is the change against the scene as it is, {undecided} where "
     "it is within the errors of both, or within {sigmas:g} standard errors of their scatter. Times "
     "are the least of several."
@@ -85,7 +85,7 @@ NOTE = (
 OF_LEAPS = "Leaps keep the modes: the ± of their changes is that of the scatter."
 
 NOTE_OF_FALL = (
-    "± is the numerical error, by the resolution; a depth without it is known to 0.1 %. % "
+    "± is the discretisation error; a depth without it is known to 0.1 %. % "
     "is the change against the scene as it is, {undecided} where it is within the errors of both. "
     "Times are the least of several."
 )
@@ -148,7 +148,7 @@ def show_effects(found: EffectsStudy) -> None:
         table.add_row(name, *cells)
     print_table(table)
     if any(map(found.is_costlier, found.trials)):
-        show_note(DEARER, "turning the effect off made a time step dearer")
+        show_note(DEARER, "turning the effect off made a time step costlier")
     for reason in dict.fromkeys(reasons.values()):
         names = ", ".join(name for name, given in reasons.items() if given == reason)
         show_note(names, reason)

@@ -16,7 +16,7 @@ def explore(
     scene: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[SCENE]", help="A scene file, or a preset; left out: the page's own."
+            metavar="[SCENE]", help="A scene file, or a preset. Default: the page's own."
         ),
     ] = None,
     settings: common.Settings = None,
@@ -39,7 +39,7 @@ def explore(
     from percussion_model.scene.writing import write_whole
 
     if port is not None:
-        raise common.refusal("--port: the page is a file now, which needs no server: leave it out")
+        raise common.refusal("--port: the page is a file now, which needs no server: omit it")
     own = None
     if scene or settings or rock or bit or solver:
         own = common.load_scene(scene, solver, settings=settings, rock=rock, bit=bit)

@@ -49,18 +49,18 @@ DIGITS = 4
 NOTE = (
     "Size is the outer diameter, else the weight. A star marks what was not published but derived "
     "or estimated. Scenes stand for a hammer: `percussion new --hammer`. `percussion hammers NAME` "
-    "tells all of one: in brackets is the range that the maker gives, or the interval that the "
+    "shows all of one: in brackets is the range that the maker gives, or the interval that the "
     "number is believed to lie in."
 )
 
 
 def hammers(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="One of them; left out: lists all.")
+        str | None, typer.Argument(metavar="[NAME]", help="One of them. Default: a list of all.")
     ] = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """List hammers on the market: size, pressure, blows, sources; or tell of one."""
+    """List hammers on the market: size, pressure, blows, sources; or show one."""
     from rich.markup import escape
 
     from percussion_model.interface.tables import named_table, print_stored, print_table

@@ -16,7 +16,7 @@ STIFFNESS, RATIO = "rock.loading_stiffness", "rock.unloading_ratio"
 # Names, units and scales of what is shown.
 SHOWN = {
     STIFFNESS: ("loading stiffness", "kN/mm", 1e6),
-    RATIO: ("unloading ratio", "", 1.0),
+    RATIO: ("unloading / loading stiffness", "", 1.0),
     "rock.loading_exponent": ("loading exponent", "", 1.0),
     "rock.reference_penetration": ("reference penetration", "mm", 1e-3),
     "rock.unloading_exponent": ("unloading exponent", "", 1.0),
@@ -28,7 +28,7 @@ SHOWN = {
 }
 SECOND_HAND = "*"
 HEADINGS = (
-    "rock", "law", "buttons", "stiffness, kN/mm", "kind", "unloading ratio", "kind",
+    "rock", "law", "buttons", "stiffness, kN/mm", "kind", "unloading / loading stiffness", "kind",
     "source", "fitted to",
 )  # fmt: skip
 # Of these, columns that stay in one block of a narrow terminal.
@@ -48,11 +48,11 @@ NOTES = (
 def rocks(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="[NAME[:BUTTONS]]", help="One of them; left out: lists all."),
+        typer.Argument(metavar="[NAME[:BUTTONS]]", help="One of them. Default: a list of all."),
     ] = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """List the rocks that --rock takes: law, numbers with intervals, sources; or tell of one."""
+    """List the rocks that --rock takes: law, numbers with intervals, sources; or show one."""
     from percussion_model.scene.rocks import read_rock, rock
     from percussion_model.scene.rocks import rocks as names
 
@@ -80,7 +80,7 @@ def cells(rock: Rock) -> tuple[str, ...]:
     """Return the texts of a row, by `HEADINGS`."""
     stiffness, ratio = rock.number(STIFFNESS), rock.number(RATIO)
     return (
-        rock.name, rock.law, str(rock.buttons or "not told"),
+        rock.name, rock.law, str(rock.buttons or "not stated"),
         interval_text(stiffness), kind_text(stiffness), interval_text(ratio), kind_text(ratio),
         rock.source["cited"], rock.fitted_to,
     )  # fmt: skip
@@ -114,7 +114,7 @@ def show_rocks(chosen: Sequence[Rock]) -> None:
     for one in chosen:
         table.add_row(*cells(one))
     print_table(table, groups=GROUPS)
-    print_notes(["", *NOTES, "`percussion rocks NAME` tells all of one."])
+    print_notes(["", *NOTES, "`percussion rocks NAME` shows all of one."])
 
 
 def show_rock(chosen: Rock) -> None:

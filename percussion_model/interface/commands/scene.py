@@ -46,7 +46,7 @@ def run(
     force: common.Force = False,
     rock_interval: Annotated[
         bool,
-        typer.Option(help="Tell how far the rate may lie by the intervals of rock and bit."),
+        typer.Option(help="Show in what range the intervals of rock and bit put the rate."),
     ] = True,
 ) -> None:
     """Run a scene; print a short table, write results with --out."""
@@ -166,7 +166,7 @@ def explain(
     bit: common.BitName = None,
     json_file: common.JsonFile = None,
 ) -> None:
-    """Tell what a scene computes, how, and what the run will cost."""
+    """Show what a scene computes, how, and what the run will cost."""
     from percussion_model.analysis.cost import explained, forecast
     from percussion_model.interface.progress import progress
     from percussion_model.interface.terminal import show_explanation
@@ -289,7 +289,7 @@ def new(
             common.hint(
                 "drive.force",
                 "drive.force and drive.reversal_distance, for effects.drive = pressure, are those "
-                "of the hammer's usual rock: `percussion drive-map` tells those of this one",
+                "of the hammer's usual rock: `percussion drive-map` finds those of this one",
             )
     if told := precharge_note(scene):
         common.print_message(f"warning: the accumulator will be empty: {told}")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def stability(
     cases: Annotated[
-        list[str] | None, typer.Argument(metavar="[CASE]...", help="Cases; all if left out.")
+        list[str] | None, typer.Argument(metavar="[CASE]...", help="Cases. Default: all.")
     ] = None,
     solvers: Annotated[
         str, typer.Option("--solvers", metavar="A,B", help="Solvers that run them.")

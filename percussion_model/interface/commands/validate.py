@@ -24,8 +24,9 @@ def validate(
         list[str] | None,
         typer.Argument(
             metavar="[EXPERIMENT]...",
-            help="Stored experiments, TOML files of own ones, or rates for drilling rates; all "
-            "that is stored if left out.",
+            help="Stored experiments, TOML files of your own, or rates for drilling rates. "
+            "Default: all "
+            "that is stored.",
         ),
     ] = None,
     out: common.Out = None,

@@ -24,7 +24,7 @@ export const WORDS = {
   errorUnknown: "(numerical error: not estimated here; percussion settled does)",
   rockRange: "{low} to {high} by what is known of rock and bit",
   rockError: "{rock}. Drills differ further: up to a factor 2 without a calibration on site.",
-  rockMissing: "What the rock leaves open is told for a bit that breaks rock: choose one.",
+  rockMissing: "The interval of the rate by the rock needs a bit that breaks rock: choose one.",
   rockWaiting: "Range by what is known of the rock: {done} of {count} samples …",
   rockOwn: "The rock's numbers were changed, or have no name: no range is known of them.",
   pinned: "Pinned, in grey: {rate}. {name}.",

@@ -35,7 +35,7 @@ CAPTIONS = {
         "hole over a blow, divided by the blow's period."
     ),
     "bit_motion": (
-        "Mean motion of the bit and its force on the rock. Colours tell the drilling mode; grey "
+        "Mean motion of the bit and its force on the rock. Colours show the drilling mode; grey "
         "bands are times at which the piston rests on the bit. Displacements count from the start "
         "of the blow (or from first contact), down positive; forces are positive in compression."
     ),

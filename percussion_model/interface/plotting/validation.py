@@ -226,8 +226,8 @@ def _restitution(ax: Axes, found: Comparison, one: Experiment, rig: Rig) -> None
     ax.set_xticks([1.5, 2, 3, 5, 10, 20, 40])
     ax.set_ylim(0.0, 1.0)
     ax.legend(loc="lower left")
-    title = "Unloading ratio that each restitution needs (bands: criterion)"
-    style.label(ax, r"unloading ratio $\gamma$", "restitution [–]", title)
+    title = "Stiffness ratio that each restitution needs (bands: criterion)"
+    style.label(ax, r"ratio of unloading to loading stiffness $\gamma$", "restitution [–]", title)
 
 
 def _rows(found: Comparison, fit: FoundFit, speed: float | None, quantity: str) -> list[Row]:

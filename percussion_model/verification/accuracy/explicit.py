@@ -286,5 +286,5 @@ def explicit_rate(
     simulation.advance(duration)
     rate = simulation.result(settle).rate_of_penetration
     if not math.isfinite(rate):
-        raise SceneError(f"explicit elements: too few blows after {settle:g} s tell no rate")
+        raise SceneError(f"explicit elements: too few blows after {settle:g} s give no rate")
     return rate

@@ -172,7 +172,7 @@ def refuse_unfit(scene: Scene) -> None:
     if scene.fem.damping_ratio is not None and scene.effects.loss:
         raise SceneError(
             f"accuracy: fem.damping_ratio = {scene.fem.damping_ratio!r} is a loss that finite "
-            "elements alone have, another one on each mesh: leave it out and set loss.time"
+            "elements alone have, another one on each mesh: omit it and set loss.time"
         )
     rigid = [bar for bar in ("piston", "bit") if getattr(scene, bar).model == "rigid"]
     if rigid:

@@ -101,7 +101,7 @@ class Bar:
         """Why it is no reference; empty where it is one."""
         if self.agreed:
             return ""
-        return "the limits disagree" if len(self.limits) > 1 else "one method alone tells it"
+        return "the limits disagree" if len(self.limits) > 1 else "one method alone gives it"
 
     @property
     def apart(self) -> float:

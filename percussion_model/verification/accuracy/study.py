@@ -257,7 +257,7 @@ class Study:
         if not found:
             if any(self.good(name, wanted, -floor) for name in names):
                 return (
-                    f"For {share} the reference does not tell: its bar is "
+                    f"For {share} the reference does not show it: its bar is "
                     f"{in_digits(100 * floor, 2)} %."
                 )
             return f"For {share} there is no method among these."

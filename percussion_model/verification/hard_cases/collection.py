@@ -42,7 +42,9 @@ NOT_ASKED = "not asked for"
 RIGID_REASON = (
     "rigid bodies: no wave takes its time to the rock, none comes back, none stays in the bit"
 )
-CHANCE_REASON = "within {sigmas:.1f} standard errors of the two rates: too few blows to tell"
+CHANCE_REASON = (
+    "within {sigmas:.1f} standard errors of the two rates: too few blows to distinguish them"
+)
 REACH_REASON = "the errors of the two rates reach {reach:.1%} of the first"
 
 
@@ -100,7 +102,7 @@ class Collection:
                 whole.append(f"{entry['case']} ({entry['reason']})")
         found = []
         if whole:
-            found.append(f"Left out, since no solver asked for computes them: {', '.join(whole)}.")
+            found.append(f"Omitted, since no solver asked for computes them: {', '.join(whole)}.")
         if partly:
             found.append(f"Not computed by every solver: {', '.join(partly)}.")
         if others:
@@ -248,7 +250,7 @@ def run_collection(
     Parameters
     ----------
     names : iterable of str, optional
-        Cases; all if left out.
+        Cases. Default: all.
     solvers : iterable of str
     share : float
         Share of each case's duration.

@@ -39,7 +39,7 @@ LEAST_ERROR = 1e-3
 # Names, units and scales of parameters that are not shown in SI.
 SYMBOLS = {
     "rock.loading_stiffness": ("loading stiffness", "kN/mm", 1e6),
-    "rock.unloading_ratio": ("unloading ratio", "", 1.0),
+    "rock.unloading_ratio": ("unloading / loading stiffness", "", 1.0),
     "rock.loading_exponent": ("n", "", 1.0),
     "rock.unloading_exponent": ("q", "", 1.0),
     "rock.chipping_force": ("chipping force", "kN", 1e3),
@@ -47,13 +47,14 @@ SYMBOLS = {
     "rock.reference_penetration": ("reference penetration", "mm", 1e-3),
 }
 NOTES = (
-    "measured ± is what the source and its reading leave open; kind tells whether the number was "
+    "measured ± is what the source and its reading leave open; kind shows whether the number was "
     "measured, computed by others, or read among points of both; * is second hand.",
     "computed ± is the numerical error, by the time step; by fit ± is what the errors of the "
     "fitted numbers leave open. Neither says whether model and rock are right.",
     "off and criterion are shares of the measured number; of a restitution, differences.",
     "What is fitted is no success: a fit has as many parameters as numbers.",
-    "(rock): half or twice the rock's stiffness, or what its unloading ratio is above 1, moves the "
+    "(rock): half or twice the rock's stiffness, or what its unloading / loading stiffness "
+    "is above 1, moves the "
     "number by more than the criterion. (masses): they do not, so it says little of the rock.",
 )
 

@@ -61,11 +61,12 @@ _PEAK = f"the greatest rate within {NEAR_PEAK:g} of gamma = 40"
 # What is known of the errors of the numbers found.
 ERRORS = (
     "± is the error where one is known: of rates and means of the stationary blow (4.3) that by "
-    "grid and scatter, of rates of the sweeps (4.4) that by convergence and scatter, which is left "
-    f"out up to {100 * LEAST_ERROR:g} % of a rate: that has three digits; of what is fitted "
+    "discretisation and scatter, of rates of the sweeps (4.4) that by convergence and "
+    "scatter, which is "
+    f"omitted up to {100 * LEAST_ERROR:g} % of a rate: that has three digits; of what is fitted "
     "the greater of the standard error of the fit and half of the difference between fits "
     "of the lower and the upper half of the points. Of all other numbers found here the error is "
-    "not estimated, nor is that of the grid in drop tests and sweeps."
+    "not estimated, nor is the discretisation error of drop tests and sweeps."
 )
 
 
@@ -195,7 +196,7 @@ def _about_rest(
         f"{1e3 * rest:.1f} ms until kinetic energy is below {AT_REST:g} of its peak, "
         f"{1e3 * standstill_from(samples, origin):.1f} ms until the rock law stays in standstill",
         abs(rest / 10e-3 - 1.0) < ABOUT,
-        "the paper does not tell what it takes for standstill; by either measure it is reached "
+        "the paper does not say what it takes for standstill; by either measure it is reached "
         f"long before the next impact, after {1e3 * period:.1f} ms, which is what it concludes",
         agrees_if=f"kinetic energy within {100 * ABOUT:g} % of 10 ms, which the paper calls about",
     )

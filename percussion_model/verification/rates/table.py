@@ -40,7 +40,8 @@ OF_WORDS = ("case", "rock", "hammer", *OF_VERDICTS)
 NOTES = (
     "measured is the mean of the published rates of a case, net; each number counts once.",
     "predicted ± is the numerical error; by the rock is what the intervals of crushing energy, "
-    "threshold and unloading ratio leave open. No number is fitted to a rate.",
+    "threshold and ratio of unloading to loading stiffness leave open. No number is fitted "
+    "to a rate.",
     "A case's bit is in mm. Power and frequency of top hammers are makers'; of hammers down the "
     "hole mass, stroke and the pressure behind the drive force are assumed.",
 )

@@ -46,7 +46,7 @@ def test_what_is_left_out_is_said(tmp_path, capsys):
     read_drop(f"{file}@5.25")
     said = " ".join(capsys.readouterr().err.split())
     assert "not read: column 1, 'index'" in said
-    assert "1 of 3 rows are before time 0: left out" in said
+    assert "1 of 3 rows are before time 0: omitted" in said
 
 
 def test_a_decimal_comma_of_a_number_is_told():
