@@ -1,4 +1,4 @@
-"""Tables and sentences of docs/accuracy.md and README.md on accuracy, from the stored studies.
+"""Tables and sentences of docs/data/accuracy.md and README.md on accuracy, from the stored studies.
 
 Nothing is measured here: what is told follows from docs/accuracy/*.json alone, and
 tests/accuracy/test_accuracy_page.py holds the pages to it.
@@ -145,7 +145,7 @@ def contest_table() -> str:
         shown = power(bar) if math.isfinite(bar) else "none"
         cells = [contest_cell(column[k]) for column in found.values()]
         setups = setup_cell(one, found[STATED[-1]][k])
-        link = f"[{name}](accuracy/{name}.md), {LADDERS[one.own].title}"
+        link = f"[{name}](../accuracy/{name}.md), {LADDERS[one.own].title}"
         rows.append([link, shown, *cells, setups])
     sums = [summary(column) for column in found.values()]
     for label in ("luckiest", "median", "worst"):
@@ -397,7 +397,8 @@ def scene_page(name: str) -> str:
     what = "Relative standard errors" if study.kind == APERIODIC else "Relative errors"
     return f"""# {study.title}
 
-Made by `python -m docs.make accuracy`; [accuracy.md](../accuracy.md) says what the columns mean.
+Made by `python -m docs.make accuracy`; [accuracy.md](../data/accuracy.md) says what the columns
+mean.
 
 ![Error against time](../images/accuracy_{name}.png)
 {more}
@@ -431,4 +432,4 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "orders": reference_orders,
     "machine": machine,
 }
-FILLED = ("accuracy.md", "data/costs.md", "data/modes.md", "../README.md")
+FILLED = ("data/accuracy.md", "data/costs.md", "data/modes.md", "accuracy.md", "../README.md")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from docutils import nodes
 from sphinx.application import Sphinx
 
 from percussion_model.interface.explore.build import is_at_hand, page_file
@@ -49,6 +50,7 @@ if is_at_hand():  # making the engine for browsers takes minutes
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
+html_search_scorer = str(Path(__file__).parent / "site" / "scorer.js")
 pygments_style = "default"
 
 # Files beside docs/ that pages link to, and the pages of the site that show them.
@@ -58,6 +60,16 @@ BESIDE = {
     "CHANGELOG.md": "developers/changelog.md",
     "benchmarks/RECORD.md": "developers/record.md",
 }
+
+
+# Measurements, methods in full and pages for developers: linked, but in neither menu nor search.
+ASIDE = ("data/", "accuracy/", "developers/", "modal", "numerics")
+
+
+def set_aside(app: Sphinx, page: nodes.document) -> None:
+    """Keep pages of measurements out of the search, and let no menu list them."""
+    if app.env.docname.startswith(ASIDE):
+        app.env.metadata[app.env.docname].update({"orphan": "", "nosearch": ""})
 
 
 def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
@@ -70,3 +82,4 @@ def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
 def setup(app: Sphinx) -> None:
     """Connect what Sphinx calls."""
     app.connect("source-read", link_pages)
+    app.connect("doctree-read", set_aside)

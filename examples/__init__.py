@@ -1,1 +1,1 @@
-"""Examples, one question each: `python -m examples.NAME`; docs/gallery.md shows them."""
+"""Examples, one question each: `python -m examples.NAME`; docs/data/gallery.md shows them."""

@@ -1,4 +1,4 @@
-"""Rigid bodies by Euler's method: a solver of few lines, as CONTRIBUTING.md tells to add one."""
+"""Rigid bodies by Euler's method: a solver of few lines, as docs/developers/extend.md adds one."""
 
 import math
 

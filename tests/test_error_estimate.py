@@ -26,7 +26,7 @@ STIFF = ({"rock.loading_stiffness": 1.8e9}, 9.9643e-3, 0.0005e-3)
 # waves of 160, 240 and 320 cells 26.5284, 26.5286, 26.5288; elements of 120, 240 and 480
 # 26.5000, 26.5173, 26.5235 mm/s, whose differences go on to 26.527
 CHATTER = ({"rock.unloading_ratio": 80.0}, 26.528e-3, 0.005e-3)
-# the reference of the project, docs/accuracy.md
+# the reference of the project, docs/data/accuracy.md
 REFERENCE = ({}, 16.3505e-3, 0.0004e-3)
 
 

@@ -58,7 +58,7 @@ def test_example_runs_and_draws(name, found):
 
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_the_gallery_shows_every_example(name):
-    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "data" / "gallery.md").read_text(encoding="utf-8")
     assert f"images/gallery_{name}.png" in page
     assert f"python -m examples.{name}" in page
 
@@ -144,7 +144,7 @@ def test_rates_of_a_branch_have_their_errors(found):
 def test_the_way_up_and_the_way_down_can_differ(found):
     """Between 300 and 600 N the hammer keeps striking evenly if it did so before.
 
-    From a feed at which blows have no order it is a matter of chance (docs/gallery.md).
+    From a feed at which blows have no order it is a matter of chance (docs/data/gallery.md).
     """
 
     def spread(start):

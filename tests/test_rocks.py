@@ -34,7 +34,7 @@ ROOT = Path(__file__).parents[1]
 RIGID = str(ROOT / "scenarios" / "rigid.toml")
 RATIO = "rock.unloading_ratio"
 POWER = "model-granite-round-power"
-# What an experiment of docs/validation.md has under the name of a rock.
+# What an experiment of docs/data/validation.md has under the name of a rock.
 FITS = {
     "kuru-granite": ("Single insert on Kuru granite", "to 9 m/s"),
     "st-anne-limestone": ("Single insert on St Anne limestone", "to the experiment"),
@@ -84,7 +84,9 @@ def test_there_are_eight_different_rocks():
 @pytest.mark.parametrize("name", FITS)
 def test_fitted_numbers_are_those_of_the_validation(name):
     title, fit = FITS[name]
-    text = (ROOT / "docs" / "validation.md").read_text("utf-8").partition(f"### {title}\n")[2]
+    text = (
+        (ROOT / "docs" / "data" / "validation.md").read_text("utf-8").partition(f"### {title}\n")[2]
+    )
     found = re.search(
         rf"fit {fit}\*\*: loading stiffness ([\d.]+) ± [\d.]+ kN/mm; "
         r"unloading / loading stiffness ([\d.]+)",

@@ -31,6 +31,6 @@ def made() -> Made:
     computer = machine()
     found = study_effects(Scene.from_toml(REFERENCE))
     return Made(
-        ("effects.md",), {"effects": block(found, computer)}, dpi=110,
+        ("data/effects.md",), {"effects": block(found, computer)}, dpi=110,
         figures=lambda: [("effects", draw_effects(found))],
     )  # fmt: skip

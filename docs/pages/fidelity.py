@@ -65,4 +65,4 @@ def costs() -> str:
 
 def made() -> Made:
     """Both tables."""
-    return Made(("fidelity.md",), {"errors": errors, "costs": costs})
+    return Made(("data/fidelity.md",), {"errors": errors, "costs": costs})

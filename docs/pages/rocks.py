@@ -119,4 +119,4 @@ def tables() -> str:
 
 def made() -> Made:
     """The notes and the tables."""
-    return Made(("rocks.md",), {"notes": fill(" ".join(NOTES), 110), "rocks": tables})
+    return Made(("data/rocks.md",), {"notes": fill(" ".join(NOTES), 110), "rocks": tables})

@@ -24,8 +24,8 @@ def collection(file: str | None) -> Collection:
 def made(file: str | None = None) -> Made:
     """Both pages and the figure."""
     found = collection(file)
-    text = page(found, "../images/stability.png", "the [guide to hard cases](../stability.md)")
+    text = page(found, "../images/stability.png", "the [guide to hard cases](stability.md)")
     return Made(
-        ("stability.md",), {"verdict": verdict(found).rstrip()}, {"data/hard_cases.md": text},
+        ("data/stability.md",), {"verdict": verdict(found).rstrip()}, {"data/hard_cases.md": text},
         figures=lambda: [("stability", draw_stability(found))],
     )  # fmt: skip

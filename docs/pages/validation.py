@@ -21,6 +21,6 @@ def made() -> Made:
     with count_bar("fits") as progress:
         found = compare(load(), progress=progress)
     return Made(
-        ("validation.md",), {"tables": block(found)}, dpi=90,
+        ("data/validation.md",), {"tables": block(found)}, dpi=90,
         figures=lambda: ((f"validation_{name}", figure) for name, figure in draw_all(found)),
     )  # fmt: skip

@@ -381,7 +381,7 @@ def find_plan(named: Path) -> SystemPlan:
 
 
 def plans() -> list[SystemPlan]:
-    """All systems of `scenarios/systems`, each with both hammers of docs/fidelity.md."""
+    """All systems of `scenarios/systems`, each with both hammers of docs/data/fidelity.md."""
     found = []
     for path in sorted(SYSTEMS.glob("*.toml")):
         plan = read_plan(path)

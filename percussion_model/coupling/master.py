@@ -72,7 +72,7 @@ class Coupling:
     compiled : bool
         Whether compiled code makes the calls where all parts are FMUs; the bits are the same.
     trust : bool
-        Whether the archive may be of any size and name FMUs outside of it (docs/trust.md).
+        Whether the archive may be of any size and name FMUs outside of it (docs/data/trust.md).
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ from percussion_model.coupling.component import CouplingError
 from percussion_model.scene.rows import shortened
 from percussion_model.scene.writing import own_prefix
 
-# Limits of an archive that is not trusted; docs/trust.md has them, too.
+# Limits of an archive that is not trusted; docs/data/trust.md has them, too.
 LARGEST_FILE = 100_000_000  # as it lies on disk [bytes]
 MOST_BYTES = 250_000_000  # unpacked, all its FMUs included [bytes]
 MOST_ENTRIES = 10_000  # the same [files]

@@ -48,7 +48,7 @@ _OF_STRING = (
 )
 _OF_RATE = "solver.accuracy = {solver.accuracy!r} is that of the rate of penetration, which "
 _FINER = (
-    "(docs/undamped.md): omit it and set solver.cells, or set effects.loss = true with "
+    "(docs/data/undamped.md): omit it and set solver.cells, or set effects.loss = true with "
     "loss.time above 0 s"
 )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 BLOW_MAP = (
     "the blow map is retired: omit it, and the default solver takes its place, with an hour "
-    "of drilling in about a minute or less (docs/fidelity.md)"
+    "of drilling in about a minute or less (docs/data/fidelity.md)"
 )
 CHAIN = 'bars between piston and bit are computed by "wave" as well now'
 # The table of a scene that held its ranges; old files of `percussion new` have it empty.

@@ -1,7 +1,7 @@
 """Estimated errors of the rate and of other means, from runs on grids whose errors differ.
 
 Modes leave a series short, steps of waves average fronts: runs with fewer tell how much is left
-(docs/accuracy.md, section 8).
+(docs/accuracy.md).
 """
 
 from __future__ import annotations

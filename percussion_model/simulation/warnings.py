@@ -127,7 +127,7 @@ def least_loss_time(result: Result) -> float:
     The energy of a mode of frequency w falls as exp(-eta w^2 t). The lowest mode of a
     free bit has w = pi / (transit time); what a blow can leave in it is at the most the
     blow energy E. So eta = ln(E / W_R) / (w^2 T), T the period of the blows
-    (docs/undamped.md). Zero where there is no barrier, or no blow to tell.
+    (docs/data/undamped.md). Zero where there is no barrier, or no blow to tell.
     """
     scene, blows = result.scene, result.counted
     if not (scene.barrier_on and scene.bit.model == "elastic" and len(blows)):

@@ -1,4 +1,4 @@
-"""Damaged saved states are refused in words and leave nothing behind (docs/fmu.md, section 5)."""
+"""Damaged saved states are refused in words and leave nothing behind (docs/data/fmu_details.md)."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from fmu_src.page import write_page
 from percussion_model import Scene
 
 ROOT = Path(__file__).parents[2]
-HOW_TO = ROOT / "docs" / "how_to" / "use_the_fmu.md"
+HOW_TO = ROOT / "docs" / "fmu.md"
 
 
 def test_the_tables_are_those_of_the_model_description():
@@ -42,7 +42,7 @@ def test_the_page_tells_what_is_known_of_errors():
         told[name] = page[page.index("How sure the outputs are") : page.index("<h2>Scene")]
     assert "cells" in told["wave"]
     assert "elements" in told["fem"]
-    assert "no error of a grid" in told["rigid"]
+    assert "no discretisation error" in told["rigid"]
     for text in told.values():
         assert "of one blow" in text
         assert "hole_depth" in text

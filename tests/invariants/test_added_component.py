@@ -1,6 +1,6 @@
 """Components that are one file each, in waves, modes, elements and rigid bodies.
 
-Added as CONTRIBUTING.md tells it, to a copy of the package, which compiles as an installation
+Added as docs/developers/extend.md does, to a copy of the package, which compiles as an installation
 does. Waves, modes and elements run as plain Python, which spares a minute of compiling, but with
 PERCUSSION_LONG=1.
 """

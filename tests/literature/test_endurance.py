@@ -1,6 +1,6 @@
 """An hour of drilling: minute after minute the same, and no digit lost to depth or time.
 
-`python tests/literature/test_endurance.py` tells the figures of docs/stability_record.md.
+`python tests/literature/test_endurance.py` tells the figures of docs/data/stability_record.md.
 """
 
 from __future__ import annotations

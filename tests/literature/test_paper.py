@@ -154,9 +154,9 @@ def test_the_stationary_blow_is_that_of_section_4_3(waves, drops):
     result, window = waves
     *said, rest, backbone, rate, flights = about_cycle(result, window.samples, window.origin)
     agree([*said, backbone, rate, flights], 8)
-    # in about 10 ms, says the paper: 5.8 ms by energy, and it does not tell what it takes
+    # in about 10 ms, says the paper: 5.8 ms by energy, and it does not say what it takes
     assert not rest.agrees
-    assert "does not tell" in rest.why
+    assert "does not say" in rest.why
     agree(list(about_double_impact(drops, result, window.samples, window.origin)), 1)
 
 

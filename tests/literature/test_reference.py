@@ -1,7 +1,7 @@
 """The reference drill, its trends and its endurance, against the paper.
 
 The paper prints a period of 45.5 ms and two contacts a blow. Rate and period are the
-limit that refined waves and refined finite elements share (docs/accuracy.md, section 2).
+limit that refined waves and refined finite elements share (docs/data/accuracy.md, section 2).
 """
 
 from __future__ import annotations

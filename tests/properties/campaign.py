@@ -237,7 +237,7 @@ def tell(record: dict[str, Any], count: int) -> str:
 
 
 def table(record: dict[str, Any]) -> str:
-    """A record as the table of docs/stability_record.md."""
+    """A record as the table of docs/data/stability_record.md."""
     count = {name: f"{number:,}" for name, number in sorted(record["solvers"].items())}
     rows = {
         "seed; reach": f"{record['seed']}; {record['reach']}",

@@ -1,4 +1,4 @@
-"""Too little structural loss is warned of where docs/undamped.md found that it matters."""
+"""Too little structural loss is warned of where docs/data/undamped.md found that it matters."""
 
 from __future__ import annotations
 

@@ -16,9 +16,9 @@ from percussion_model.scene.presets import scenario_folder
 
 PAGE = DOCS / "system.md"
 HOW_TO = PAGE.parent / "how_to"
-CONTROLLER, SYSTEM = HOW_TO / "couple_a_controller.md", HOW_TO / "write_a_system.md"
-SCENARIOS = HOW_TO / "run_the_scenarios.md"
-PAGES = (PAGE, CONTROLLER, SYSTEM, SCENARIOS)
+CONTROLLER, SYSTEM = HOW_TO / "couple_a_controller.md", PAGE
+SCENARIOS = PAGE.parent / "data" / "scenarios.md"
+PAGES = (PAGE, CONTROLLER, SCENARIOS)
 
 
 def test_the_tables_are_current():

@@ -3,7 +3,7 @@
 A peer that methods are compared with. Half lumped, half consistent mass, whose dispersion is
 of fourth order, hard contact, and a step that is as long as events allow.
 It stays as the one peer that is ahead of explicit elements anywhere: in 4 of the 44 cells of
-docs/accuracy.md, section 2.
+docs/data/accuracy.md, section 2.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ readings included, beside whatever else the machine did.
 """
 
 
-def page(found: Collection, picture: str | None, guide: str = "docs/stability.md") -> str:
+def page(found: Collection, picture: str | None, guide: str = "docs/data/stability.md") -> str:
     """Text of the page.
 
     Parameters

@@ -402,7 +402,7 @@ def _about_ratio(found: Study, how: str) -> Iterator[Statement]:
         abs(peak - 40.0) < NEAR_PEAK and onset > CHATTER_SHARE * PAPER_CHATTER,
         "chatter sets in the earlier, the sharper the front of the impact: K_C of the text, "
         "fifteen times softer than that of Table II, blunts it and gives the paper's figures; "
-        "a rigid contact does not (docs/paper.md)",
+        "a rigid contact does not (docs/data/paper.md)",
         agrees_if=f"{_PEAK}, and chatter from {CHATTER_SHARE * PAPER_CHATTER:g} on or later",
     )
     on_the_way = maxima(x, rate)

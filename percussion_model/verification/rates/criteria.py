@@ -1,6 +1,6 @@
 """Criteria of predicted rates, and what they say of a set of ratios.
 
-They were fixed before any rate of these cases was computed (docs/validation.md):
+They were fixed before any rate of these cases was computed (docs/data/validation.md):
 
 - mean ratio predicted/measured, the geometric one, from 0.6 to 1.6;
 - scatter, exp of the standard deviation of ln ratio, at most 1.6;
