@@ -27,7 +27,7 @@ WAY = (
     ("Result", "blows, events, ledger", "simulation", (0.53, 1.0)),
     ("commands", "tables, figures, reports", "interface", (0.53, 1.0)),
 )
-WIDTH, ROW, GAP = 17.0, 1.4, 0.2
+WIDTH, ROW, GAP = 17.0, 1.55, 0.2
 LEFT, WAY_AT, WAY_WIDTH, SIDE = 0.3, 8.9, 3.4, 13.0
 BETWEEN = re.compile(" [|:] ")
 RUN = "#0072B2"
@@ -90,7 +90,7 @@ def _layer(ax: Axes, row: list[str], y: float) -> None:
         x = LEFT + k * (width + 0.2)
         box(ax, (x, y), (width, ROW), COLOURS[name], NOTE)
         ax.text(x + 0.2, y + 0.28, name, va="center", fontweight="bold")
-        _lines(ax, (x + 0.2, y + 0.62), f"{PACKAGE}/{name}", int(10.5 * width))
+        _lines(ax, (x + 0.2, y + 0.62), f"{PACKAGE}/{name}", int(9.5 * width))
 
 
 def _lines(ax: Axes, place: Place, folder: str, columns: int) -> None:

@@ -127,8 +127,9 @@ def _forces(ax: Axes) -> None:
     for side in (-0.9, 0.9):
         arrow(ax, (AXIS + side, end), (AXIS + side, end - 0.8), FORCE)
         arrow(ax, (AXIS + side, end), (AXIS + side, end + 0.8), FORCE)
-    ax.text(x + 0.25, 12.0, "bit force $F_R$, by the rock law", va="center", color=FORCE)
-    ax.text(x + 0.25, 12.6, "compression is positive", va="center", color=NOTE, fontsize=SMALL)
+    ax.text(x + 0.25, 12.0, "bit force $F_R$", va="center", color=FORCE)
+    ax.text(x + 0.25, 12.6, "by the rock law", va="center", color=NOTE, fontsize=SMALL)
+    ax.text(x + 0.25, 13.2, "compression is positive", va="center", color=NOTE, fontsize=SMALL)
     ax.text(x + 0.25, 8.75, "in the bars: $v = d + u$,  $F = Z\\,(d - u)$", va="center",
             color=NOTE)  # fmt: skip
 

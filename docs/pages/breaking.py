@@ -232,6 +232,8 @@ def draw_rotation(axes: Axes, rows: list[dict[str, float]]) -> None:
     axes.set(xscale="log", xlabel="rotation [rpm]", ylabel="rate of penetration [m/h]")
     axes.set_ylim(bottom=0.0)
     other = axes.twinx()
+    other.spines["right"].set_visible(True)
+    other.grid(visible=False)
     (torque,) = other.plot(rpm, [row["torque"] for row in rows], "s--", ms=3, color="#D55E00")
     other.set_ylabel("torque [N m]")
     other.set_ylim(bottom=0.0)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from matplotlib.figure import Figure
 
 from docs.blocks import REFERENCE, Made
+from docs.drawings.drill import draw_drill
 from docs.drawings.house import draw_house
 from docs.drawings.model import draw_model
 from docs.drawings.system import draw_system
@@ -15,6 +16,7 @@ from percussion_model import Scene
 
 DPI = 120.0
 DRAWINGS: dict[str, Callable[[], Figure]] = {
+    "drawing_drill": draw_drill,
     "drawing_house": draw_house,
     "drawing_model": lambda: draw_model(Scene.from_toml(REFERENCE)),
     "drawing_system": draw_system,

@@ -32,7 +32,8 @@ __all__ = ["CAPTIONS", "draw_figures", "figures", "plot"]
 CAPTIONS = {
     "overview": (
         "The whole run, one point for each blow. The rate of penetration is the advance of the "
-        "hole over a blow, divided by the blow's period."
+        "hole over a blow, divided by the blow's period. Deviations are from the mean of the blows "
+        "after settling: a straight fall shows the stability multiplier."
     ),
     "bit_motion": (
         "Mean motion of the bit and its force on the rock. Colours show the drilling mode; grey "

@@ -89,11 +89,12 @@ def _edges(contacts: list[tuple[float, float]]) -> list[tuple[str, float]]:
 
 
 def _letter_edges(ax: Axes, contacts: list[tuple[float, float]]) -> None:
-    style.room_above(ax, 0.14)
+    style.room_above(ax, 0.22)
     for k, (letter, time) in enumerate(_edges(contacts)):
         ax.annotate(
             letter,
-            (time * MS, 0.92),
+            # two rows, since a contact may end as the next one begins
+            (time * MS, 0.92 if k // 2 % 2 == 0 else 0.82),
             (-2 if k % 2 == 0 else 2, 0),
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
@@ -131,9 +132,13 @@ def _near_zero(ax: Axes, window: Window, contacts: list[tuple[float, float]]) ->
     for (letter, _), k in zip(_edges(contacts), samples, strict=False):
         x, y = u[k] * MM, v[k]
         ax.plot([x], [y], "o", color="black", markersize=3.5, zorder=5)
-        # the line leaves to the right, upwards: above where it comes, below where it parts
-        off, side = ((5, 3), "bottom") if letter in "ACEG" else ((4, -4), "top")
-        ax.annotate(letter, (x, y), off, textcoords="offset points", va=side, fontweight="bold")
+        # above where the line comes, below where it parts; later contacts to the left, as they
+        # may begin where one has ended
+        above, left = letter in "ACEG", letter in "EFGH"
+        ax.annotate(
+            letter, (x, y), (-5 if left else 5, 3 if above else -4), textcoords="offset points",
+            ha="right" if left else "left", va="bottom" if above else "top", fontweight="bold",
+        )  # fmt: skip
     ax.axvline(0.0, color=style.RULE_COLOUR, linewidth=0.6)
     ax.margins(0.08)
 

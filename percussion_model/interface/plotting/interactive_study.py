@@ -17,6 +17,7 @@ from bokeh.models import (
     HoverTool,
     LayoutDOM,
     LinearColorMapper,
+    LogColorMapper,
     Range1d,
     Select,
     Slider,
@@ -48,6 +49,8 @@ KIND_COLOURS = dict(
 WIDEST, WIDE, NARROW = 300, 190, 80
 # Lines that can be told apart.
 MOST_LINES = 9
+# A greatest value so many times the least one has colours by ratios.
+WIDE_RANGE = 10.0
 # Steps of an axis are even if they differ by no more than this share.
 EVEN = 1e-6
 # What can be shown: column of the page, name, unit, column of a study, factor from SI.
@@ -293,7 +296,12 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
                        for i in range(len(shown))],
         }
     )  # fmt: skip
-    mapper = LinearColorMapper(Viridis256, nan_color="#DDDDDD", **_limits(cells.data["value"]))
+    limits = _limits(cells.data["value"])
+    # a map over decades would be of one colour: its colours step by ratios
+    is_wide = limits["low"] > 0.0 and limits["high"] > WIDE_RANGE * limits["low"]
+    mapper = (LogColorMapper if is_wide else LinearColorMapper)(
+        Viridis256, nan_color="#DDDDDD", **limits
+    )
     chosen, given = _selector(), in_hover(GIVEN)
     known = of_choice(chosen, DIGITS, name="known digits")
     left = panel("", x.label, y.label, height=400, x_axis_type=x.scale, y_axis_type=y.scale,
@@ -330,14 +338,15 @@ def _map(found: Study, columns: dict[str, np.ndarray]) -> LayoutDOM:
     names = _titles()
     left.title.text = names["rate"]
     low, high = y.values.min(), y.values.max()
-    right.title.text = f"Cuts: {y.label} from {low:.4g} (dark) to {high:.4g} (light)"
+    # in two lines: half a page is too narrow for one
+    right.title.text = f"Cuts, dark to light:\n{y.key} {low:.4g} to {high:.4g} {y.unit}"
     right.yaxis.axis_label = names["rate"]
     update = CustomJS(
         args={
             "all": everything, "cells": cells, "lines": lines, "mapper": mapper,
             "choice": chosen, "sliders": sliders, "titles": names, "left": left.title,
             "strides": [axis.stride for axis in others], "right": right.yaxis[0],
-            "shown": shown, "width": len(x.values), "hideable": list(HIDDEN),
+            "shown": shown, "width": len(x.values), "hideable": list(HIDDEN), "wide": is_wide,
             "words": UNDECIDED, "names": list(KINDS),
         },
         code=UPDATE_MAP,
@@ -373,9 +382,9 @@ for (let j = 0; j < offset.length; j++) {
   verdict[j] = hidden ? words : "";
   motion[j] = names[kind[k]];
   mark[j] = kind[k] == 0 ? 0 : 6;
-  if (isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
+  if (isFinite(v) && (v > 0 || !wide)) { low = Math.min(low, v); high = Math.max(high, v); }
 }
-if (low > high) { low = 0; high = 1; }
+if (low > high) { low = wide ? 0.1 : 0; high = 1; }
 mapper.low = low;
 mapper.high = high > low ? high : low + (Math.abs(low) || 1) * 1e-3;
 lines.data.ys = shown.map(row => Array.from(value.slice(row * width, (row + 1) * width)));

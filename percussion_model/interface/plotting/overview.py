@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from percussion_model.interface.plotting import style
-from percussion_model.interface.plotting.style import KN, MM, MS
+from percussion_model.interface.plotting.style import KN, MM
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import rate_text, shown_error
 
@@ -20,6 +20,8 @@ MOST_MARKERS = 150
 BIT_POSITION_COLOUR = "#111111"
 # An axis never zooms in on less than this share of its values: settled is flat.
 LEAST_SPAN = 0.02
+# Nearer to the mean blows count as alike: a relative deviation.
+LEAST_DEVIATION = 1e-9
 
 
 def draw_overview(result: Result) -> Figure:
@@ -32,14 +34,8 @@ def draw_overview(result: Result) -> Figure:
     rate = blows["hole_advance"] / blows["period"]
     _series(axes[0, 1], time, rate * MM, "rate [mm/s]", "Rate of penetration of each blow")
     _mean(axes[0, 1], result)
-    _series(
-        axes[1, 0],
-        time,
-        blows["impact_velocity"],
-        "velocity [m/s]",
-        "Mean piston velocity at impact",
-    )
-    _series(axes[1, 1], time, blows["period"] * MS, "period [ms]", "Period of each blow")
+    _energies(axes[1, 0], blows)
+    _deviations(axes[1, 1], result)
     _counts(axes[2, 0], blows)
     _forces(axes[2, 1], blows)
     for ax in axes.flat:
@@ -105,6 +101,34 @@ def _keep_flat(ax: Axes, values: np.ndarray) -> None:
     if room > 0:
         ax.set_ylim(low - room, high + room)
     ax.ticklabel_format(axis="y", useOffset=False)
+
+
+def _energies(ax: Axes, blows: np.ndarray) -> None:
+    """Draw what the piston brings, and what of it goes into the rock."""
+    for field, colour, dashes, name in (
+        ("blow_energy", style.PISTON_COLOUR, "--", "of the piston"),
+        ("rock_energy", style.BIT_COLOUR, "-", "into the rock"),
+    ):
+        ax.plot(blows["time"], blows[field], dashes, color=colour, label=name)
+    high = float(np.nanmax(blows[["blow_energy", "rock_energy"]].tolist()))
+    ax.set_ylim(0.0, 1.3 * high or 1.0)
+    ax.legend(loc="upper right", ncols=2)
+    style.label(ax, "time [s]", "energy [J]", "Energy of each blow")
+
+
+def _deviations(ax: Axes, result: Result) -> None:
+    """Draw how far each blow is from the mean of those that count: how motion settles."""
+    blows, counted = result.blows, result.counted
+    for field, name in (
+        ("impact_velocity", "impact velocity"), ("period", "period"), ("hole_advance", "advance"),
+    ):  # fmt: skip
+        mean = float(np.mean(counted[field])) if len(counted) else 0.0
+        if mean:
+            off = np.maximum(np.abs(blows[field] / mean - 1.0), LEAST_DEVIATION)
+            ax.semilogy(blows["time"], 100.0 * off, label=name, **_marks(len(blows), size=1.8))
+    ax.legend(loc="upper right", ncols=3)
+    ax.set_ylim(top=20.0 * ax.get_ylim()[1])
+    style.label(ax, "time [s]", "deviation [%]", "How far blows are from their mean")
 
 
 def _counts(ax: Axes, blows: np.ndarray) -> None:

@@ -66,7 +66,7 @@ def draw_all(found: Comparison) -> Iterator[tuple[str, Figure]]:
 
 def draw_experiment(found: Comparison, one: Experiment) -> Figure:
     """Draw displacement, force, a third view, and deviations by their criteria."""
-    fig = Figure(figsize=(12.5, 8.4), layout="constrained")
+    fig = Figure(figsize=(9.0, 8.8), layout="constrained")
     axes = fig.subplots(2, 2)
     rig = Rig(Reading(one.gauge))
     fits = _drawn(found, one)
