@@ -126,10 +126,23 @@ def test_a_count_of_words_is_right():
     assert words.prose(text).split() == ["One", "formula", "[two](x.md),", "three."]
 
 
+# What scripts write in full, or but for a head; other pages mark what scripts write into them.
+MADE = (
+    *("parameters.md", "reference/outputs.md", "reference/command_line.md"),
+    *("data/fmu_interface.md", "data/system_variables.md", "data/hard_cases.md"),
+    *("data/paper_statements.md", "data/coupling_step.md", "data/step_rejection.md"),
+    *("data/rocks.md", "data/hammers.md"),
+)
+
+
 def test_all_prose_by_hand_is_short():
     """That of pages aside too, README, CONTRIBUTING and the record of speed; no CHANGELOG."""
-    pages = {*(ROOT / "docs").rglob("*.md")} - {*(ROOT / "docs" / "accuracy").glob("*.md")}
+    docs = ROOT / "docs"
+    made = {docs / name for name in MADE}
+    assert all(page.is_file() for page in made)
+    pages = {*docs.rglob("*.md")} - {*(docs / "accuracy").glob("*.md")} - made
     pages |= {ROOT / name for name in ("README.md", "CONTRIBUTING.md", "benchmarks/RECORD.md")}
+    assert len(pages) > 55
     assert sum(map(words.count, pages)) <= 25_000
 
 

@@ -122,12 +122,12 @@ COMPONENT = Component(
         "efficiency": (
             EFFICIENCY,
             "-",
-            "eta: volume by that of craters on flat rock, by sharp buttons",
+            "eta: volume divided by that of craters on flat rock, sharp buttons",
             0.0,
             1.0,
         ),
         "wear_length": (0.0, "m", "hole after which wear is 63 % done; 0: no wear", 0.0, 1e6),
-        "worn": (0.55, "-", "efficiency of worn buttons by that of sharp ones", 0.0, 1.0),
+        "worn": (0.55, "-", "efficiency of worn buttons divided by that of sharp ones", 0.0, 1.0),
         "drilled": (0.0, "m", "hole that the bit has drilled before", 0.0, 1e6),
         "flushed_volume": (
             0.0,

@@ -328,7 +328,7 @@ COMPONENT = Component(
         "vapour_pressure": (3e3, "Pa", "pressure of the oil's vapour, absolute", 1.0, 1e5),
         "straight": (5e4, "Pa", "difference of pressures below which flow through an orifice "
                      "grows straight with it", 1e2, 1e7),
-        "step": (1.5e-4, "s", "time for which the oil is foretold; shorter is more accurate",
+        "step": (1.5e-4, "s", "time for which the oil is predicted; shorter is more accurate",
                  1e-6, 1e-3),
     },
     on_piston=on_piston,

@@ -431,7 +431,7 @@ COMPONENT = Component(
                  *_PORT),
         "discharge": (0.7, "-", "C_d: discharge coefficient of all areas", 0.0, 1.0),
         "friction": (24.19, "N", "friction of the piston", 0.0, 1e6),
-        "step": (3e-4, "s", "time for which the gas is foretold; shorter is more accurate",
+        "step": (3e-4, "s", "time for which the gas is predicted; shorter is more accurate",
                  1e-7, 1e-3),
         "wall_conductance": (0.0, "W/K", "heat that passes the walls of a chamber", 0.0, 1e6),
         "wall_temperature": (293.15, "K", "temperature of the walls", 100.0, 2000.0),

@@ -86,7 +86,7 @@ DRIVE = (3000.0, 13100.0)  # the paper; tuned to the blow energies of hammers on
 REVERSAL = (0.0148, 0.04)  # the same; the greatest is the paper's
 # Three buttons on Kuru granite, Saksala et al. (2014); the paper's by the diameter, 6 inch.
 STIFFNESS = (1.62e8, 1.5e9)
-# From a flat button under a wave of 200 MPa to Kuru granite at 13 m/s (docs/validation.md).
+# From a flat button under a wave of 200 MPa to Kuru granite at 13 m/s (docs/data/validation.md).
 PENETRATION = (3.5e-4, 2.1e-3)
 HOLE = (0.048, 0.165)  # bits of those hammers
 
@@ -257,7 +257,7 @@ class Contact(Parameters):
     """Contact between a rigid piston and a rigid bit."""
 
     restitution: float | None = quantity(
-        None, "-", "coefficient of restitution; St Venant value if left out", ALL_RIGID, ge=0, le=1
+        None, "-", "coefficient of restitution; default: St Venant's value", ALL_RIGID, ge=0, le=1
     )
 
 
@@ -291,8 +291,7 @@ HOLE_DIAMETER: ParameterRow = dataclasses.replace(
     quantity(
         None,
         "m",
-        "diameter of the hole, which tells specific energy and advance by breaking; "
-        "left out: not known",
+        "diameter of the hole, for specific energy and advance by breaking; default: not known",
         typical=HOLE,
         ge=1e-3,
         le=10,
@@ -322,7 +321,7 @@ class SolverOptions(Parameters):
         None,
         "-",
         "modes of the first elastic bar, or steps in which a wave crosses it; "
-        "left out: by the solver",
+        "default: by the solver",
         SOLVER_WAVE,
         ge=1,
         le=100_000,
@@ -332,7 +331,7 @@ class SolverOptions(Parameters):
         None,
         "-",
         "wanted relative error of the rate of penetration, in place of cells; "
-        "left out: none is asked for",
+        "default: none is asked for",
         ge=1e-4,
         le=0.1,
     )
