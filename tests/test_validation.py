@@ -147,7 +147,7 @@ def test_what_was_fitted_is_reached(found):
 
 
 def test_the_page_has_these_numbers(found):
-    page = (DOCS / "validation.md").read_text(encoding="utf-8")
+    page = (DOCS / "data" / "validation.md").read_text(encoding="utf-8")
     before, _, rest = page.partition("<!-- begin tables -->")
     assert rest.count("<!-- end -->") == 1
     for row in found.rows:
