@@ -1,7 +1,7 @@
 // How the search of the site orders pages: as Sphinx does, but long lists, which have every word,
 // come after pages that explain.
 var Scorer = {
-  score: ([page, , , , score]) => score - (/^(reference\/|parameters$|glossary$)/.test(page) ? 4 : 0),
+  score: ([page, , , , score]) => score - (/^(reference\/|parameters$|glossary$)/.test(page) ? 8 : 0),
   objNameMatch: 11,
   objPartialMatch: 6,
   objPrio: { 0: 15, 1: 5, 2: -5 },

@@ -206,7 +206,7 @@ TABLE = PartTable(
             for k, name in enumerate(_DOWN)
         },
         "feed_force_mean": ("N", "push, filtered"),
-        "head_position": ("m", "displacement of the head, new rods left out of account"),
+        "head_position": ("m", "displacement of the head, without that of adding rods"),
         "head_velocity": ("m/s", "velocity of the head"),
         "length": ("m", "length of the rods"),
         "weight": ("N", "weight of head and rods, less buoyancy"),
