@@ -10,11 +10,11 @@ import pytest
 
 from percussion_model import Scene, SceneError, simulate
 from percussion_model.analysis.fitting.predictions import bit_alone
+from percussion_model.physics.judgement import FIRST_ORDER
 from percussion_model.physics.records import BLOW
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.simulation.accuracy_control import GROWTH, run_to_accuracy, time_needed
 from percussion_model.simulation.error_estimate import (
-    FIRST_ORDER,
     FLOOR_SHARE,
     GridRun,
     estimate_error,

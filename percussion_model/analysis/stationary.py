@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from percussion_model.physics.judgement import FIRST_ORDER
 from percussion_model.physics.settling import (
     STALLED_AFTER,
     Verdict,
@@ -18,7 +19,7 @@ from percussion_model.physics.settling import (
 )
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.driller_numbers import driller_numbers
-from percussion_model.simulation.error_estimate import FIRST_ORDER, with_error_estimate
+from percussion_model.simulation.error_estimate import with_error_estimate
 from percussion_model.simulation.files import plain
 from percussion_model.simulation.means import by_volume, numbers_over, scatter_over
 from percussion_model.simulation.rate import advances, rate_of_blows, ratio_of_sums

@@ -5,10 +5,12 @@
 // modulus, density]. Errors are those of the Python package, in its words.
 
 const WORD = 8, FACTS = 4, SAMPLES = 512, EVENTS = 1024, BLOWS = 64, ADVANCE = 0, COMMIT = 1;
+// A column of blows that are counted.
+const ONES = -1;
 
 // As in analysis/stationary.py, which tells why.
 const FEWEST_SCATTERED = 100, NEXT_CHECK = 1.25, SETTLING_SHARE = 0.2, MOTOR_SETTLES = 10;
-const STRETCHES = [1 / 8, 1 / 4, 1 / 2];
+const RATE_SO_FAR = ["hole_advance", "period", [1 / 8, 1 / 4, 1 / 2], 3];
 
 export class EngineError extends Error {}
 
@@ -22,10 +24,11 @@ function plain(code, form) {
 }
 
 export class Engine {
-  // source: bytes of engine.wasm, or a Response with them; table: content of table.json
+  // source: bytes of engine.wasm, a Response with them, or the module made of them; table: content of
+  // table.json
   static async load(source, table) {
     const bytes = source.arrayBuffer ? await source.arrayBuffer() : source;
-    const { instance } = await WebAssembly.instantiate(bytes, {});
+    const found = await WebAssembly.instantiate(bytes, {}), instance = found.instance ?? found;
     instance.exports._initialize?.();
     return new Engine(instance.exports, table);
   }
@@ -38,6 +41,8 @@ export class Engine {
     this.free = plain(code.native_free, ":w");
     this._check = plain(code.scene_check_base, "w:ww");
     this._solver = plain(code.scene_solver_base, "w:w");
+    this._judge = Object.fromEntries(Object.entries(table.judgement).map(([name, form]) =>
+      [name, plain(code[`judge_${name}_base`], form)]));
     this.entries = {};
     for (const solver of table.solvers) {
       this.entries[solver] = {};
@@ -151,6 +156,91 @@ export class Engine {
       written(facts[k], form ?? ""));
   }
 
+  // --- numbers over blows and their errors, as physics/judgement.py has them
+
+  // Rows of lists of blows in memory, for as long as a function uses their addresses.
+  withBlows(lists, use) {
+    const { bytes: { blow: bytes }, columns: { blow: columns } } = this.table, width = bytes / WORD;
+    const addresses = lists.map((blows) => this.allocate(Math.max(blows.length, 1) * width));
+    lists.forEach((blows, i) => {
+      const numbers = this.numbers(addresses[i], blows.length * width), words = this.words(addresses[i], blows.length * width);
+      blows.forEach((one, k) => columns.forEach(({ name, word, whole }) => {
+        if (whole) words[k * width + word] = BigInt(one[name]);
+        else numbers[k * width + word] = one[name];
+      }));
+    });
+    try {
+      return use(addresses);
+    } finally {
+      addresses.forEach((address) => this.free(address));
+    }
+  }
+
+  // Numbers over blows by name: value, scatter, and how far kinds of blows are apart. Wanted by name:
+  // two columns whose sums are divided ("one": of ones), stretches, and fewest blows.
+  numbersOver(blows, wanted) {
+    const words = { ...Object.fromEntries(this.table.columns.blow.map(({ name, word }) => [name, word])), one: ONES };
+    return this.withBlows([blows], ([rows]) => this._withNumbers(8, (room) =>
+      Object.fromEntries(Object.entries(wanted).map(([name, [over, under, stretches, least]]) => {
+        this.numbers(room, 3 + stretches.length).set(stretches, 3);
+        this._judge.number(rows, blows.length, words[over], words[under], room + 3 * WORD, stretches.length, least, room);
+        const [value, scatter, apart] = this.numbers(room, 3);
+        return [name, { value, scatter, apart }];
+      }))));
+  }
+
+  // Mean drilling cycles of blows.
+  cyclesOver(blows) {
+    return this.withBlows([blows], ([rows]) => this._judge.cycles(rows, blows.length));
+  }
+
+  // Barriers, by the present one, beyond which close decisions of a run fall the other way, as runs on
+  // coarser grids tell.
+  barriers(blows, others) {
+    const lists = [blows, ...others], count = lists.length;
+    return this.withBlows(lists, (addresses) => this._withNumbers(2 * count + 2, (room) => {
+      const words = this.words(room, 2 * count);
+      lists.forEach((one, k) => { words[k] = BigInt(addresses[k]); words[count + k] = BigInt(one.length); });
+      const out = room + 2 * count * WORD;
+      this._judge.barriers(room, room + count * WORD, count, out);
+      return Array.from(this.numbers(out, 2)).filter(Number.isFinite);
+    }));
+  }
+
+  // Relative error of a number. rows: [value, scatter, cycles, modes or steps] of the run, of so many
+  // others on coarser grids, and of those with another barrier.
+  errorOf(grid, rows, others, apart, promised, floorShare, numerical) {
+    return this._withNumbers(4 * rows.length, (room) => {
+      this.numbers(room, 4 * rows.length).set(rows.flat());
+      return this._judge.error(grid, room, rows.length, others, apart, promised, floorShare, numerical);
+    });
+  }
+
+  // Modes or steps of runs to compare with, of a scene that has so many at present.
+  coarser(scene, grid, present) {
+    return this._withImage(scene, (image) => this._withNumbers(present + 2, (room) =>
+      Array.from(this.words(room, this._judge.coarser(image, grid, present, room)), Number)));
+  }
+
+  // Relative error of the rate that so many modes or steps promise.
+  promised(scene, grid, present) {
+    return this._withImage(scene, (image) => this._judge.promised(image, grid, present));
+  }
+
+  longerStep(step, longest) {
+    return this._judge.longer_step(step, longest);
+  }
+
+  // Give room for numbers to a function.
+  _withNumbers(count, use) {
+    const room = this.allocate(count);
+    try {
+      return use(room);
+    } finally {
+      this.free(room);
+    }
+  }
+
   _kind(number) {
     return this.table.solvers.find((name) => this.table.kinds[name] === number) ?? "";
   }
@@ -226,32 +316,11 @@ function general(value, count) {
   return short(value.toFixed(count - 1 - power));
 }
 
-function written(value, form) {
+export function written(value, form) {
   if (form.startsWith("|")) return form.slice(1, -1).split("|")[Math.round(value) - 1];
   if (form === "d") return String(Math.trunc(value));
   if (form === "r") return repr(value);
   return general(value, Number(/^\.(\d+)g$/.exec(form)?.[1] ?? 6));
-}
-
-// Rate of penetration over blows and its standard error [m/s], as `rate_so_far` of these.
-export function rateOf(blows) {
-  const sum = (values) => values.reduce((total, one) => total + one, 0), n = blows.length;
-  if (n < 3) return { rate: NaN, error: NaN };
-  const advances = blows.map((one) => (Math.abs(one.hole_advance) < 1e-13 ? 0 : one.hole_advance));
-  const time = sum(blows.map((one) => one.period)), rate = sum(advances) / time, sums = [0];
-  blows.forEach((one, k) => sums.push(sums[k] + advances[k] - rate * one.period));
-  const scattered = (length) => [
-    sum(sums.slice(length).map((one, k) => (one - sums[k]) ** 2)) / (n + 1 - length),
-    length * (1 - length / n),
-  ];
-  const [short, walk] = scattered(1);
-  if (n < 20) return { rate, error: Math.sqrt((short / walk) * n) / time };
-  const variances = STRETCHES.map((share) => {
-    const [long, longWalk] = scattered(Math.max(Math.trunc(share * n), 2));
-    const a = Math.max((long - short) / (longWalk - walk), 0), b = short - a * walk;
-    return b < 0 ? (long / longWalk) * n : a * n + b;
-  });
-  return { rate, error: Math.sqrt(Math.max(...variances)) / time };
 }
 
 // --- motions
@@ -433,7 +502,8 @@ export class Motion {
           const [rate, error, multiplier] = ["rate", "error", "multiplier"].map((name) => found[place[name]]);
           return { kind: "periodic", order: whole("order"), rate, error, multiplier };
         }
-        const known = rateOf(this.blows.slice(Math.trunc(SETTLING_SHARE * this.blows.length)));
+        const counted = this.blows.slice(Math.trunc(SETTLING_SHARE * this.blows.length));
+        const { value: rate, scatter: error } = engine.numbersOver(counted, { rate: RATE_SO_FAR }).rate, known = { rate, error };
         if (this.blows.length >= mostBlows || known.error <= scatter * Math.abs(known.rate)) {
           return { kind: "aperiodic", ...none, ...known };
         }
@@ -443,6 +513,31 @@ export class Motion {
     } finally {
       engine.free(asked);
     }
+  }
+
+  // What it is divided by: the number of the kind of grid, and modes or steps in the first elastic bar.
+  grid() {
+    const { engine: { table: { grids }, _judge: judge } } = this, [[name, bar] = []] = this._bars();
+    if (this.solver === "modal") return [grids.modes, judge.modes(this.base, name === "piston" ? 1 : 0)];
+    if (this.solver === "wave") return [grids.steps, this.entries.cells(this._image, bar, 0, 0)];
+    return [grids.none, 1];
+  }
+
+  // Share of the energy put in that the discretisation took.
+  numericalShare() {
+    const { bytes, energies } = this.engine.table;
+    this._seen(this.time);
+    return this.engine._judge.numerical(this._reading + bytes.reading - energies * WORD, energies);
+  }
+
+  // All that moves, and its time, to go on from in another motion of the same scene.
+  get state() {
+    return { words: this.engine.words(this.moving, this._size).slice(), time: this.time };
+  }
+
+  set state({ words, time }) {
+    this.engine.words(this.moving, this._size).set(words);
+    this.time = time;
   }
 
   // Change inputs at the next grid point, by the keys of `table.inputs` [SI].

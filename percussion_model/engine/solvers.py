@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from percussion_model.components import COMPONENTS
 from percussion_model.engine.solver import EngineSolver
+from percussion_model.physics.judgement import longer_step
 from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene
 from percussion_model.solvers.fem.records import FEM_PAR, FEM_STATE
@@ -24,8 +24,6 @@ from percussion_model.solvers.state import State
 from percussion_model.solvers.wave.records import WAVE_PAR, WAVE_STATE
 from percussion_model.solvers.wave.resolution import comparable_steps
 
-# Steps of components in runs to compare with, by those of this one: errors of second order double.
-LONGER_STEPS = math.sqrt(2.0)
 # Elements and contact stiffness of runs to compare with, by those of this one.
 COARSER_ELEMENTS = 0.5
 # Of the directory of a motion by modes: how many each form has, that of the free bit first.
@@ -35,13 +33,12 @@ SIZES_ROW = 0
 def longer_steps(scene: Scene) -> dict[str, float]:
     """Steps of components that are on, longer, so that runs with them tell what steps cost.
 
-    A component has such a step as its parameter `step`. Where a longer one may not be, half of it
-    tells nearly as much.
+    A component has such a step as its parameter `step`.
     """
     steps = {one.name: one.parameters["step"] for one in COMPONENTS if "step" in one.parameters}
     found = {f"{name}.step": longest for name, (*_, longest) in steps.items()}
     return {
-        key: scene[key] * (LONGER_STEPS if LONGER_STEPS * scene[key] <= longest else 0.5)
+        key: longer_step(scene[key], longest)
         for key, longest in found.items()
         if scene.matters(key)
     }

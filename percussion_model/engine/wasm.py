@@ -17,7 +17,9 @@ from percussion_model.engine.platforms import WASM
 from percussion_model.engine.web_table import SOLVERS, table
 
 SCRIPT = compiler.HERE / "engine.js"
-MODULES = (f"{compiler.NAME}.engine.scene_checks", *map(library.module_of, SOLVERS))
+# Besides the solvers.
+OTHERS = ("scene_checks", "judgement")
+MODULES = tuple(map(library.module_of, (*OTHERS, *SOLVERS)))
 # A library that calls nothing outside, with all that is said to be exported.
 FLAGS = ("-DENGINE_LIBRARY", "-mexec-model=reactor", "-Wl,--export-dynamic", "-Wl,--strip-all")
 SOURCES = (compiler.HERE / "memory.c", Path(__file__), compiler.HERE / "objects.py")

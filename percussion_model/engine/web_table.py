@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.engine import library, records
+from percussion_model.engine import judgement, library, records
 from percussion_model.engine.entries import ENTRIES
 from percussion_model.engine.fault_texts import faults
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.scene_image import AT, COUNTS, PRESSED, Own
+from percussion_model.physics.judgement import Grid
+from percussion_model.physics.ledger import ENERGIES
 from percussion_model.physics.records import (
     BLOW,
     BLOW_COLUMNS,
@@ -130,6 +132,11 @@ def table() -> dict[str, Any]:
         "fault": {one.name.lower(): int(one) for one in Fault},
         "status": {one.name.lower(): int(one) for one in Status},
         "request": words_of(REQUEST),
+        "judgement": {
+            name.removeprefix("judge_"): form for name, (_, form) in judgement.EXPORTED.items()
+        },
+        "grids": {one.name.lower(): int(one) for one in Grid},
+        "energies": len(ENERGIES),
         "verdicts": {one.name.lower(): int(one) for one in Verdict},
         "modes": {one.value: one.name for one in Mode},
         "event_kinds": {one.value: one.name.lower() for one in EventKind},

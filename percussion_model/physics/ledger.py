@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from percussion_model.components import entries_on
+from percussion_model.physics.kernel import plain
 from percussion_model.physics.records import LEDGER_FIELDS, STORED_FIELDS
 
 WORKS = ("drive", "feed", "gravity", "climb", "refill", *entries_on("work"))
@@ -21,12 +22,23 @@ NUMERICAL = ("numerical", "overshoot")
 STORED = ("kinetic", "elastic", "recoverable", *entries_on("stored"))
 
 # They stand at the end of a reading.
-_ENERGIES = (*LEDGER_FIELDS, *STORED_FIELDS)
+ENERGIES = (*LEDGER_FIELDS, *STORED_FIELDS)
+START_AT, NUMERICAL_AT = ENERGIES.index("start"), ENERGIES.index("numerical")
+WORKS_AT = tuple(map(ENERGIES.index, WORKS))
 
 
 def energies(reading: np.ndarray) -> dict[str, float]:
     """Entries of the ledger and stored energies [J] in a READING array of length 1."""
-    return dict(zip(_ENERGIES, reading.view(np.float64)[-len(_ENERGIES) :].tolist(), strict=True))
+    return dict(zip(ENERGIES, reading.view(np.float64)[-len(ENERGIES) :].tolist(), strict=True))
+
+
+@plain
+def put_in(energies):
+    """Energy put in, in the order of `ENERGIES`, that what is unexplained is compared with [J]."""
+    works = 0.0
+    for k in WORKS_AT:
+        works += abs(energies[k])
+    return abs(energies[START_AT]) + works
 
 
 def complete_ledger(entries: dict[str, float]) -> dict[str, float]:
@@ -49,7 +61,7 @@ def unexplained(entries: dict[str, float]) -> tuple[float, float]:
     start = entries["start"]
     apart = total(entries[name] for name in NUMERICAL)
     residual = start + total(works) - stored - dissipated - apart
-    return residual, abs(start) + total(map(abs, works))
+    return residual, put_in([entries[name] for name in ENERGIES])
 
 
 def total(values: Iterable[float]) -> float:

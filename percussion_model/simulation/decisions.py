@@ -7,20 +7,13 @@ or not (`barrier_margin`), a cycle counts or not (`counting_margin`), the gap cl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-# A margin may be off by so many times what coarser runs are: energies that decide converge late,
-# and not from one side (docs/data/stated_errors.md, section 6).
-UNSURE = 6.0
-# So it may where coarser runs have other decisions, which tell nothing of this one.
-UNSURE_OTHERWISE = 0.02
-# The other barrier lies beyond the energies of all blows that are near, and what is doubtful, by
-# this factor: the other motion has other energies. Those so many times as far are not near.
-BEYOND, NEAR = 1.2, 3.0
-# A decision that is farther from the barrier is not near, however unsure [1].
-FAR = 0.07
+from percussion_model.physics import judgement
+
 # Counts a blow, and what tells how close the decisions behind them were.
 _COUNTED = {
     "drilling_cycles_per_blow": "counting_margin",
@@ -38,21 +31,8 @@ def unsure_margin(name: str, blows: np.ndarray, others: Sequence[np.ndarray]) ->
     others : sequence of ndarray of BLOW
         Of coarser runs; what has nothing to tell is skipped.
     """
-    middles = [_middle(one[name]) for one in (blows, *others)]
-    off = np.abs(np.array(middles[1:]) - middles[0])
-    return UNSURE * float(np.max(off, initial=0.0, where=np.isfinite(off)))
-
-
-def _middle(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else np.nan
-
-
-def near_barrier(margins: np.ndarray, unsure: float) -> np.ndarray:
-    """Those of the margins whose decision may fall the other way, and others nearly as close."""
-    if not np.any(np.abs(margins) <= min(unsure, FAR)):
-        return margins[:0]
-    return margins[np.abs(margins) <= min(NEAR * unsure, FAR)]
+    own, *middles = (judgement.middle(one[name]) for one in (blows, *others))
+    return judgement.unsure_by(own, middles)
 
 
 def other_barriers(margins: np.ndarray, unsure: float) -> Iterator[float]:
@@ -71,10 +51,9 @@ def other_barriers(margins: np.ndarray, unsure: float) -> Iterator[float]:
         Above 1 where cycles began by little energy, below 1 where little was missing.
     """
     for sign in (1.0, -1.0):
-        near = near_barrier(margins[sign * margins > 0.0], unsure)
-        if len(near):
-            farthest = max(float(np.max(np.abs(near))), min(unsure, FAR))
-            yield 1.0 + sign * BEYOND * farthest
+        factor = judgement.other_barrier(sign, margins, unsure)
+        if not math.isnan(factor):
+            yield factor
 
 
 def unsure_counts(blows: np.ndarray, others: Sequence[np.ndarray]) -> dict[str, float]:

@@ -13,75 +13,45 @@ from functools import cached_property
 
 import numpy as np
 
-from percussion_model.scene.bars import bar_transit_time
+from percussion_model.physics import judgement
 from percussion_model.scene.inputs import SimulationError
-from percussion_model.scene.numbers import Numbers, numbers_of
+from percussion_model.scene.numbers import numbers_of
 from percussion_model.scene.scene import Scene, SceneError
 from percussion_model.simulation.decisions import (
-    UNSURE_OTHERWISE,
-    near_barrier,
     other_barriers,
     unsure_counts,
-    unsure_margin,
 )
 from percussion_model.simulation.means import COUNTS, numbers_over, scatter_over
 from percussion_model.simulation.rate import LARGE_ERROR, LEAST_BLOWS, rate_of_blows
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.uncertain import in_digits
 from percussion_model.simulation.warnings import least_loss_time
-from percussion_model.solvers.modal.resolution import elastic_bars, promised_error
-from percussion_model.solvers.setup import kelvin_voigt_time
+from percussion_model.solvers.modal.resolution import promised_error
 from percussion_model.solvers.wave.resolution import (
     coarser_steps,
     error_by_pulse,
     error_by_steps,
 )
 
-# Two aperiodic runs differ if they do by more than so many standard errors.
-CONFIDENCE = 2.0
-# Margin on the spread of rates where motions differ: the right one may lie outside of them.
-SPREAD_MARGIN = 1.5
-# What elements lose to discretisation costs about this share of it in the rate: at 1, 2 and
-# 50 elements in the piston 0.78, 0.36 and 0.033 of the energy, and 0.36, 0.11 and 0.004.
-NUMERICAL_SHARE = 0.4
-# The same where coarser elements have another motion; 2.6 was seen (scenarios/chatter.toml).
-NUMERICAL_SHARE_OF_MOTIONS = 3.0
-# The error is not below this share of what the rule of steps promises; modes are surer.
+# The error is not below this share of what the rule of steps promises.
 FLOOR_SHARE = 0.1
-FLOOR_SHARE_OF_MODES = 0.08
-# With modes whose loss time is so many times their time step nothing is expected to be right: at
-# 0.01 steps 0.0075 was seen where fewer modes agreed to 0.0014, and 0.006 in most of 20 scenes.
-SLIGHT_LOSS = 5e-4
 # Runs to compare with may take this share of the work of the run they judge; the time that
 # they take to set up comes on top.
 COMPARISON_WORK = 0.12
 # They last for so many blows at least: to settle and to count.
 FEWEST_BLOWS = 10
-# Steps half as long again change half of an error of first order.
-FIRST_ORDER = 2.0
-# Steps that are not this many times as long change less of it.
-NEARLY_AS_LONG = 4.0 / 3.0
 # What brings the rate of a solver closer.
 REMEDIES = {
     "modal": "solver.accuracy (--accuracy) takes as many modes as an error needs",
     "wave": "solver.accuracy (--accuracy) takes as many steps as an error needs",
     "fem": "more fem.elements and a greater fem.contact_stiffness bring it closer",
 }
-# A run is compared with those that have at least this share of its modes.
-LEAST_MODES = 0.3
 # Words of the warning of a large error.
 LARGE = "may be off by"
-# Where blows have two numbers of drilling cycles, and one is this rare, the motion is near the
-# threshold between two: on another grid all blows may be of either kind.
-RARE = 0.25
 # What the vibration that is left of the blow before decides, and grids decide otherwise.
 OF_VIBRATION = ("standstill_bit_force", "rebound_velocity")
-# Runs whose drilling cycles a blow differ by more, or by more than this share of them, are
-# of different motions; where there are dozens, one more or less is a smooth change.
-SAME_MOTION, SAME_SHARE = 0.5, 0.05
-# A motion repeats whose standard error is below this share of the rate, and does not where it is
-# so many times as large.
-STEADY, SCATTERING = 1e-4, 20.0
+# What the grids of solvers are.
+_GRIDS = {"modal": judgement.Grid.MODES, "wave": judgement.Grid.STEPS}
 
 
 @dataclass(frozen=True)
@@ -128,10 +98,25 @@ class GridRun:
         return float(np.mean(counted)) if len(counted) else 0.0
 
     @cached_property
+    def row(self) -> np.ndarray:
+        """What is judged, as the columns of `judgement.Row`."""
+        return np.array([*self._number, self.cycles, self.resolution])
+
+    @property
+    def resolution(self) -> int:
+        """Cells or modes of the first elastic bar; 1 of rigid bodies."""
+        return next(iter(self.result.cells.values()), 1)
+
+    @property
+    def grid(self) -> int:
+        """`judgement.Grid` of the solver."""
+        return int(_GRIDS.get(self.result.solver, judgement.Grid.ELEMENTS))
+
+    @cached_property
     def apart(self) -> float:
         """Relative distance to the number over blows of one kind, where one of two is rare."""
         kinds = _two_kinds(self.result.counted)
-        return _apart(self.value, [rate_of_blows(blows)[0] for blows in kinds])
+        return judgement.apart(self.value, *(rate_of_blows(one)[0] for one in kinds))
 
     @property
     def useful(self) -> bool:
@@ -154,26 +139,20 @@ class GridRun:
         for name, value in numbers_over(blows).items():
             number = value, scatter.get(name, math.nan)
             found[name] = one = GridRun(self.result, self.promised, number, self.floor_share)
-            apart = _apart(value, [numbers[name] for numbers in of_kinds])
+            apart = judgement.apart(value, *(numbers[name] for numbers in of_kinds))
             vars(one).update(shared, _number=number, apart=apart)
         return found
 
 
-def _two_kinds(blows: np.ndarray) -> list[np.ndarray]:
-    """Blows by their drilling cycles, where these are two numbers and one is rare."""
-    cycles = blows["drilling_cycles"]
-    few = cycles == (cycles.min() if len(cycles) else 0)
-    if few.all() or np.ptp(cycles[~few]) > 0:
-        return []
-    kinds = [blows[few], blows[~few]]
-    return kinds if min(map(len, kinds)) < RARE * len(blows) else []
+def _two_kinds(blows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Blows by their drilling cycles, where these are two numbers and one is rare; else all."""
+    first = judgement.first_kind(blows["drilling_cycles"])
+    return (blows[first], blows[~first]) if first.any() else (blows, blows)
 
 
-def _apart(value: float, others: Sequence[float]) -> float:
-    """Greatest relative distance to other values of a number."""
-    if value == 0.0 or not others:
-        return 0.0
-    return float(np.nanmax([0.0, *(abs(other / value - 1.0) for other in others)]))
+def _rows(runs: Sequence[GridRun]) -> np.ndarray:
+    """Rows of runs, those that were cut short left out."""
+    return np.array([run.row for run in runs if not run.result.cut_short]).reshape(-1, 4)
 
 
 @dataclass(frozen=True)
@@ -199,19 +178,13 @@ class Estimate:
 
 def grid_run(result: Result) -> GridRun:
     """A result with what its steps or modes promise."""
+    run = GridRun(result)
     if result.solver == "wave":
-        return GridRun(result, error_by_steps(_resolution(result), result.scene.effects.string))
+        promised = error_by_steps(run.resolution, result.scene.effects.string)
+        return replace(run, promised=promised)
     if result.solver != "modal":
-        return GridRun(result)
-    numbers, modes = numbers_of(result.scene), _resolution(result)
-    promised = max(promised_error(numbers, modes), _by_slight_loss(numbers, modes))
-    return GridRun(result, promised)
-
-
-def _by_slight_loss(numbers: Numbers, modes: int) -> float:
-    """Relative error of the rate that is expected of modes that ring for long."""
-    steps = kelvin_voigt_time(numbers) * modes / bar_transit_time(elastic_bars(numbers)[0])
-    return SLIGHT_LOSS / steps if steps > 0.0 else math.inf
+        return run
+    return replace(run, promised=promised_error(numbers_of(result.scene), run.resolution))
 
 
 def error_by_decisions(part: GridRun, decided: Sequence[GridRun]) -> float:
@@ -224,8 +197,7 @@ def error_by_decisions(part: GridRun, decided: Sequence[GridRun]) -> float:
     decided : sequence of GridRun
         On the same grid, with another barrier.
     """
-    off = (_difference(other, part) for other in decided if other.useful)
-    return SPREAD_MARGIN * max(off, default=0.0)
+    return judgement.error_by_decisions(part.row, _rows(decided))
 
 
 def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
@@ -242,58 +214,13 @@ def estimate_error(run: GridRun, others: Sequence[GridRun]) -> Estimate:
     -------
     Estimate
     """
-    is_modal = run.result.solver == "modal"
-    share = FLOOR_SHARE_OF_MODES if is_modal else FLOOR_SHARE
-    scatter, floor = run.scatter / abs(run.value), share * run.promised
-    others = [other for other in others if other.useful]
-    if not others:
-        return Estimate(math.inf, scatter, floor)  # nothing is known
-    by_grid = _by_modes(run, others) if is_modal else _by_steps(run, others[-1])
-    return Estimate(by_grid, scatter, floor)
-
-
-def _by_steps(run: GridRun, other: GridRun) -> float:
-    """Error by the steps: what is left of one of first order, by a run with longer ones."""
-    longer = _resolution(run.result) / _resolution(other.result)
-    left = 1.0 / (longer - 1.0) if 1.0 < longer < NEARLY_AS_LONG else FIRST_ORDER
-    return left * _difference(other, run)
-
-
-def _by_modes(run: GridRun, others: Sequence[GridRun]) -> float:
-    """Error by the number of modes: the largest distance to runs with not much fewer."""
-    least = LEAST_MODES * _resolution(run.result)
-    near = [other for other in others if _resolution(other.result) >= least] or others[-1:]
-    off = max(_difference(other, run) for other in near)
-    if all(_same_motion(run, other) for other in near):
-        return off
-    return max(SPREAD_MARGIN * off, run.promised)
-
-
-def _resolution(result: Result) -> int:
-    """Cells or modes of the first elastic bar; 1 of rigid bodies."""
-    return next(iter(result.cells.values()), 1)
-
-
-def _difference(other: GridRun, run: GridRun) -> float:
-    """Relative difference of two rates; 0 where scatter alone explains it."""
-    off = abs(run.value - other.value)
-    if _repeat_alike(run, other) and off <= CONFIDENCE * math.hypot(run.scatter, other.scatter):
-        return 0.0
-    return off / abs(run.value)
-
-
-def _repeat_alike(run: GridRun, other: GridRun) -> bool:
-    """Whether it is not so that a run repeats from blow to blow, and another one scatters."""
-    steady, scatters = (abs(one.scatter / one.value) for one in (run, other))
-    return not steady <= STEADY <= SCATTERING * STEADY <= scatters
-
-
-def _same_motion(run: GridRun, other: GridRun) -> bool:
-    """Whether two runs have the same number of drilling cycles a blow, and repeat alike."""
-    if not _repeat_alike(run, other):
-        return False
-    off = abs(run.cycles - other.cycles)
-    return off <= max(SAME_MOTION, SAME_SHARE * run.cycles)
+    known = [other for other in others if other.useful]
+    if run.grid != judgement.Grid.MODES:
+        known = known[-1:]
+    rows, share = _rows(known), run.floor_share
+    floor = judgement.floor_of_error(run.grid, run.row, rows, run.promised, share, 0.0)
+    by_grid = judgement.error_by_grid(run.grid, run.row, rows, run.promised)
+    return Estimate(by_grid, run.scatter / abs(run.value), floor)
 
 
 def with_error_estimate(
@@ -355,7 +282,7 @@ def _has_makeshift(result: Result, coarser: Sequence[Scene]) -> bool:
     """Whether loss refuses the steps to compare with: near there others agree by chance."""
     if result.solver != "wave":
         return False
-    usual = coarser_steps(_resolution(result))
+    usual = coarser_steps(next(iter(result.cells.values()), 1))
     return any(scene.solver.cells != usual for scene in coarser)
 
 
@@ -369,12 +296,12 @@ def otherwise_decided(run: GridRun, others: Sequence[GridRun]) -> list[Scene]:
 
 
 def _unsure_margin(run: GridRun, others: Sequence[GridRun]) -> float:
-    """By how much the margin of the barrier may be off, as runs tell that fit as well."""
-    alike = [other for other in others if abs(run.cycles - other.cycles) <= SAME_MOTION]
-    if len(alike) < len(others):  # their closest decision is another one
-        return UNSURE_OTHERWISE
-    blows = (run.result.counted, [other.result.counted for other in alike])
-    return unsure_margin("barrier_margin", *blows)
+    """By how much the margin of the barrier may be off."""
+    own, *middles = (
+        judgement.middle(one.result.counted["barrier_margin"]) for one in (run, *others)
+    )
+    cycles = [other.cycles for other in others]
+    return judgement.unsure_of_barrier(own, run.cycles, middles, cycles)
 
 
 def errors_of_numbers(
@@ -428,17 +355,13 @@ def _estimate(part: GridRun, others: Sequence[GridRun]) -> Estimate:
     scatter = part.scatter / abs(part.value)
     if not others:
         return Estimate(0.0, scatter, 0.0)
-    if part.result.solver == "modal":
-        return estimate_error(part, others)
-    known = [other for other in others if other.useful]
-    # each of the others is coarser in another way
-    apart = _by_steps if part.result.solver == "wave" else _difference
-    off = sum(apart(part, other) for other in known) if known else math.inf
-    same = all(_same_motion(part, other) for other in known)
-    share = NUMERICAL_SHARE if same else NUMERICAL_SHARE_OF_MOTIONS
-    floor = share * abs(part.result.energy["numerical_relative"])
+    rows, numerical = _rows(others), part.result.energy["numerical_relative"]
+    floor = judgement.floor_of_error(
+        part.grid, part.row, rows, part.promised, part.floor_share, numerical
+    )
+    by_grid = judgement.error_by_grid(part.grid, part.row, rows, part.promised)
     # the ledger has no share where only a wave from outside gave energy
-    return Estimate(off, scatter, max(part.floor_share * part.promised, _by_pulse(part), floor))
+    return Estimate(by_grid, scatter, max(floor, _by_pulse(part)))
 
 
 def _by_pulse(run: GridRun) -> float:
@@ -458,7 +381,7 @@ def _of_whole(
     by_grid = 0.0
     if whole.result.cells:
         by_decisions = error_by_decisions(part, decided)
-        by_grid = max(estimate.grid, SPREAD_MARGIN * whole.apart, by_decisions)
+        by_grid = max(estimate.grid, judgement.SPREAD_MARGIN * whole.apart, by_decisions)
     return Estimate(by_grid, scatter, estimate.floor)
 
 
@@ -485,7 +408,7 @@ def warnings_of_decisions(
     if error_by_decisions(part, decided) < error:
         return
     blows = part.result.counted
-    near = near_barrier(blows["barrier_margin"], _unsure_margin(part, others))
+    near = judgement.near_barrier(blows["barrier_margin"], _unsure_margin(part, others))
     rates = " or ".join(in_digits(1e3 * other.value, 4) for other in decided if other.useful)
     off, within = (in_digits(100.0 * share, 2) for share in (error, float(np.max(np.abs(near)))))
     yield (
@@ -510,7 +433,7 @@ def _comparison_time(result: Result, coarser: Sequence[Scene]) -> float:
     """Until when runs to compare with last [s]; work rises between cells and their square."""
     work = 0.0
     for scene in coarser:
-        share = _cells_asked(scene) / _resolution(result)
+        share = _cells_asked(scene) / next(iter(result.cells.values()), 1)
         work += 0.5 * (share + share * share)
     blows = result.blows[:FEWEST_BLOWS]
     if not len(blows):

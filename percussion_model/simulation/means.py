@@ -9,7 +9,7 @@ import numpy as np
 
 from percussion_model.physics.gas import AIR
 from percussion_model.physics.records import BLOW_COLUMNS
-from percussion_model.simulation.rate import LEAST_BLOWS, advances, ratios_of_sums
+from percussion_model.simulation.rate import LEAST_BLOWS, advances, ratio_of_sums
 
 # Means over blows, and the columns of the blow table behind them.
 _MEANS = {
@@ -29,7 +29,7 @@ _OF_COMPONENTS = tuple(column.name for column in BLOW_COLUMNS if column.of)
 # Means of whole numbers.
 COUNTS = ("contacts_per_blow", "drilling_cycles_per_blow")
 # Ratios of sums over blows: numerator and denominator.
-_RATIOS = {
+RATIOS = {
     "transfer_efficiency": ("rock_energy", "blow_energy"),
     "mean_bit_force": ("bit_impulse", "period"),
     "mean_contact_force": ("contact_impulse", "period"),
@@ -42,7 +42,7 @@ _RATIOS = {
 _GREATEST = ("peak_bit_force", "peak_contact_force")
 # Blows take back less of these than of the advance of the hole, and stretches of a quarter of
 # all blows are few: by chance they hide what lasts.
-_STRETCHES = 1 / 16, 1 / 8, 1 / 4
+STRETCHES = 1 / 16, 1 / 8, 1 / 4
 # A greatest value is one that so many blows come near to: those of a cycle do, those of
 # aperiodic motion do not.
 _NEAR_GREATEST = 0.1
@@ -85,7 +85,7 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     # of a component that is off, all are zero
     found |= {name: math.nan for name in _OF_COMPONENTS if not found[name]}
     found["blow_frequency"] = 1.0 / found["blow_period"]
-    found |= {name: _ratio(blows, *columns) for name, columns in _RATIOS.items()}
+    found |= {name: _ratio(blows, *columns) for name, columns in RATIOS.items()}
     return found | {name: _greatest(blows[name]) for name in _GREATEST}
 
 
@@ -159,12 +159,10 @@ def scatter_over(blows: np.ndarray) -> dict[str, float]:
         if name not in _OF_COMPONENTS or blows[column].any()
     }
     pairs = {name: (_column(blows, column), ones) for name, column in means.items()}
-    for name, (column, by) in _RATIOS.items():
+    for name, (column, by) in RATIOS.items():
         if float(np.sum(_column(blows, by))) > 0.0:
             pairs[name] = _column(blows, column), _column(blows, by)
-    values, weights = (np.array(series) for series in zip(*pairs.values(), strict=True))
-    _, errors = ratios_of_sums(values, weights, _STRETCHES)
-    found = dict(zip(pairs, errors.tolist(), strict=True))
+    found = {name: ratio_of_sums(*series, STRETCHES)[1] for name, series in pairs.items()}
     for name, column in means.items():
         if math.isnan(found[name]):
             found[name] = _scatter_of_known(blows[column])
@@ -180,10 +178,8 @@ def _mean_of_known(values: np.ndarray) -> float:
 
 def _scatter_of_known(values: np.ndarray) -> float:
     """Standard error of the mean of what is defined, where not all is."""
-    known = values[np.newaxis, np.isfinite(values)]
-    if known.size == 0:
-        return math.nan
-    return float(ratios_of_sums(known, np.ones(known.shape), _STRETCHES)[1][0])
+    known = values[np.isfinite(values)]
+    return ratio_of_sums(known, np.ones(len(known)), STRETCHES)[1] if len(known) else math.nan
 
 
 def _greatest(values: np.ndarray) -> float:

@@ -51,9 +51,14 @@ _FUNCTIONS = (
     modal_resolution.asked_modes,
     modal_resolution.default_modes,
     modal_resolution.modes_for,
+    modal_resolution.fill_coarser,
+    modal_resolution.promised_error,
     rigid_restitution.st_venant_restitution,
     rigid_restitution.restitution,
     wave_resolution.steps_for,
+    wave_resolution.coarser_steps,
+    wave_resolution.fill_comparable,
+    wave_resolution.error_by_steps,
 )
 
 

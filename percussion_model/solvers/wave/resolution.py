@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 # Steps in the piston, where a scene asks for none, and the relative error of a rate by them.
 DEFAULT_STEPS, DEFAULT_ERROR = 16, 5e-3
 # And where there are no rods, whose steps are cut at closures: the reference is then off by 1e-4,
@@ -53,11 +55,22 @@ def comparable_steps(steps: int) -> list[int]:
     The coarsest that is not coarser than `coarser_steps` and differs by a quarter, then coarser
     ones, the nearest first, then those that differ by less.
     """
-    wanted = coarser_steps(steps)
+    counts = np.zeros(max(steps, 1), np.int64)
+    return [int(one) for one in counts[: fill_comparable(steps, counts)]]
+
+
+def fill_comparable(steps: int, counts: np.ndarray) -> int:
+    """Fill in steps of runs that a run may be compared with; how many there are."""
+    wanted, found = coarser_steps(steps), 0
     near = max(wanted, math.floor(steps / LEAST_COARSER))
-    counts = [
-        *range(wanted, near + 1),
-        *range(wanted - 1, math.ceil(steps / MOST_COARSER) - 1, -1),
-        *range(near + 1, steps),
-    ]
-    return [count for count in counts if 0 < count < steps]
+    least = math.ceil(steps / MOST_COARSER)
+    for first, end, way in (
+        (wanted, near + 1, 1),
+        (wanted - 1, least - 1, -1),
+        (near + 1, steps, 1),
+    ):
+        for count in range(first, end, way):
+            if 0 < count < steps:
+                counts[found] = count
+                found += 1
+    return found
