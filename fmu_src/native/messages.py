@@ -6,13 +6,13 @@ Python package.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from enum import IntEnum
 
 from fmu_src.hammer.inputs import NAMES_OUTSIDE
 from percussion_model.engine.records import KINDS
 from percussion_model.scene.inputs import INPUTS
 from percussion_model.simulation import validity
+from percussion_model.simulation.templates import Fact, only
 
 
 class Note(IntEnum):
@@ -30,38 +30,9 @@ class Note(IntEnum):
     IN_VAIN = 13  # and the following: one for each input
 
 
-class Fact(float):
-    """A number that writes itself as a place for a fact, to turn a text into a template.
-
-    What is computed of it is the same fact: kernels give facts as they are to be written.
-    """
-
-    place: int
-
-    def __new__(cls, place: int, value: float) -> Fact:
-        """Make a fact that is compared as a value."""
-        fact = super().__new__(cls, value)
-        fact.place = place
-        return fact
-
-    def __format__(self, form: str) -> str:
-        return f"{{{self.place}:{form}}}" if form else f"{{{self.place}}}"
-
-    def __rmul__(self, factor: float) -> Fact:
-        return Fact(self.place, float(self) * factor)
-
-    def __truediv__(self, other: float) -> Fact:
-        return Fact(self.place, float(self) / other)
-
-
-def _only(texts: Iterator[str]) -> str:
-    (text,) = texts
-    return text
-
-
 def _counted(name: str, two: str, template: str) -> str:
     """Template of a note that counts something, from the note for two of it."""
-    text = _only(validity.guard_notes({name: 2}))
+    text = only(validity.guard_notes({name: 2}))
     if two not in text:
         raise ValueError(f"{two!r} is not in the note {text!r}")
     return text.replace(two, template, 1)
@@ -71,17 +42,17 @@ def notes() -> tuple[str, ...]:
     """Templates of the notes, by `Note`."""
     one = Fact(0, 1.0)
     texts: dict[int, str] = {
-        Note.BARRIER: _only(validity.barrier_note(one, Fact(1, 1.0))),
-        Note.LEDGER: _only(validity.ledger_note(one)),
-        Note.GIVES_ENERGY: _only(validity.numerical_note(Fact(0, -1.0), "modal")),
+        Note.BARRIER: only(validity.barrier_note(one, Fact(1, 1.0))),
+        Note.LEDGER: only(validity.ledger_note(one)),
+        Note.GIVES_ENERGY: only(validity.numerical_note(Fact(0, -1.0), "modal")),
         Note.LOCKED: _counted("locked", "2 time steps", "{0:d} time step{1:||s|}"),
         Note.STORM: _counted("storms", "2 storms", "{0:d} storm{1:||s|}"),
-        Note.FLIGHT: _only(validity.flight_note(one)),
-        Note.BUTTON: _only(validity.button_note(one, 1.0)),
-        Note.RATE: _only(validity.rate_note(one)),
+        Note.FLIGHT: only(validity.flight_note(one)),
+        Note.BUTTON: only(validity.button_note(one, 1.0)),
+        Note.RATE: only(validity.rate_note(one)),
     }
     for name, kind in KINDS.items():
-        text = _only(validity.numerical_note(0.5, name))
+        text = only(validity.numerical_note(0.5, name))
         texts[Note.TAKES_ENERGY + kind - 1] = text.replace("50 %", "{0:.2g} %", 1)
     ordered = [texts[k] for k in range(1, 1 + len(texts))]
     vain = [f"a new {NAMES_OUTSIDE[name]} has no effect in this scene" for name in INPUTS]

@@ -11,7 +11,22 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from percussion_model.analysis.rock_interval import SAMPLES, sample_shares, uncertain_numbers
+from percussion_model.analysis.rock_interval import (
+    DURATION,
+    ENDS,
+    SAMPLES,
+    SETTLE,
+    sample_shares,
+    uncertain_numbers,
+)
+from percussion_model.analysis.stationary import (
+    FEWEST_JUDGED,
+    JUDGED_SHARE,
+    MEANS,
+    ROUNDING,
+    SETTLING_SHARE,
+)
+from percussion_model.components import COMPONENTS
 from percussion_model.engine import library, wasm
 from percussion_model.engine.compiler import Report
 from percussion_model.engine.web_table import PRESSURES, scene_as_json, table
@@ -22,6 +37,12 @@ from percussion_model.scene.rocks import rock, rocks
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.writing import write_whole
+from percussion_model.simulation import validity
+from percussion_model.simulation.error_estimate import FLOOR_SHARE
+from percussion_model.simulation.means import RATIOS, STRETCHES
+from percussion_model.simulation.rate import LEAST_BLOWS, STRETCH
+from percussion_model.simulation.templates import Fact, only
+from percussion_model.simulation.warnings import THROTTLED
 
 HERE = Path(__file__).parent
 NAME = "explore.html"
@@ -30,8 +51,8 @@ BROUGHT = HERE / NAME
 FOLDER = HERE.parents[2] / "dist" / "web"
 # Modules of page and worker, each after those that it takes from.
 PAGE = ("words", "numbers", "own", "scene", "pictures", "plot", "figures", "drawing", "inputs",
-        "result", "player", "main")  # fmt: skip
-WORKER = ("settle", "grid_error", "kept", "picture", "worker")
+        "result", "player", "judge", "notes", "pool", "main")  # fmt: skip
+WORKER = ("settle", "kept", "picture", "worker")
 # Bits that go with a hammer, by the diameter of its hole; the reference bores 3 1/4 inches.
 LEAST_HOLE, MOST_HOLE, REFERENCE_HOLE = 0.85, 1.35, 0.0826
 IMPORT = re.compile(r'^import \{(.*?)\} from "[./\w]*?(\w+)\.js";\n', re.M | re.S)
@@ -161,6 +182,51 @@ def catalogue() -> dict[str, Any]:
         "uncertain": {name: _uncertain(name) for name in bits()},
         "shares": {count: sample_shares(SAMPLES, count) for count in range(1, MOST_UNCERTAIN + 1)},
         "transits": TRANSITS_SHOWN,
+        "settled": _settled(),
+        "notes": _notes(),
+        "interval": {"duration": DURATION, "settle": SETTLE, "ends": ENDS[0]},
+    }
+
+
+def _settled() -> dict[str, Any]:
+    """What judges a settled motion as `settled` does."""
+    ratios = {name: RATIOS[name] for name in MEANS if name in RATIOS}
+    ratios |= {"blow_period": ("period", "one"), "blow_frequency": ("one", "period"),
+               "impact_velocity": ("impact_velocity", "one")}  # fmt: skip
+    steps = {one.name: one.parameters["step"] for one in COMPONENTS if "step" in one.parameters}
+    return {
+        # columns of blows, stretches, fewest blows
+        "numbers": {"rate_of_penetration": ("hole_advance", "period", (STRETCH,), LEAST_BLOWS)}
+        | {name: (*columns, STRETCHES, 1) for name, columns in ratios.items()},
+        "settlingOf": {"blow_period": ("period", "one", (STRETCH,), 1)},
+        "steps": {f"{name}.step": longest for name, (*_, longest) in steps.items()},
+        "fewest": FEWEST_JUDGED,
+        "judged": JUDGED_SHARE,
+        "settling": SETTLING_SHARE,
+        "rounding": ROUNDING,
+        "floor": FLOOR_SHARE,
+    }
+
+
+def _notes() -> dict[str, Any]:
+    """Texts of notes, with places for numbers, and the limits beyond which they are told."""
+    one, much = Fact(0, 1.0), Fact(0, 1e9)
+    return {
+        "texts": {
+            "button": only(validity.button_note(one, 1.0)),
+            "rate": only(validity.rate_note(one)),
+            "limit": only(validity.limit_note(one, 0.0)).replace("1e+02 %", "{0:.2g} %"),
+            "jam": only(validity.jam_note(much, Fact(1, 1.0))),
+            "lifted": only(validity.recoil_note(1e9, one, True)),
+            "recoil": only(validity.recoil_note(1e9, one, False)),
+        },
+        "limits": {
+            "depth": validity.BUTTON_LENGTH,
+            "rate": validity.MOST_RATE,
+            "limited": validity.MOST_LIMITED,
+            "held": validity.HELD,
+        },
+        "throttled": THROTTLED,
     }
 
 

@@ -2,7 +2,7 @@
 import { short, unitOf } from "./numbers.js";
 import { bitPicture, hammerPicture, rockPicture } from "./pictures.js";
 import { OWN } from "./own.js";
-import { CHOICES, LENGTHS, OTHERS, SLIDERS, WORDS } from "./words.js";
+import { CHOICES, LENGTHS, OTHERS, SLIDERS, WORDS, fill } from "./words.js";
 
 const STEPS = 400;
 
@@ -26,6 +26,13 @@ function cards(box, group, options, chosen, choose) {
   box.innerHTML = options.map(({ name, title, picture }) =>
     `<label><input type="radio" name="${group}" value="${escaped(name)}"${name === chosen ? " checked" : ""}>${picture}<span>${escaped(title)}</span></label>`).join("");
   box.onchange = event => choose(event.target.value);
+  const all = box.previousElementSibling;
+  all.onclick = () => { setAll(box.classList.toggle("all")); };
+  const setAll = open => {
+    all.textContent = open ? WORDS.fewer : fill(WORDS.all, { n: options.length });
+    all.setAttribute("aria-expanded", String(open));
+  };
+  setAll(box.classList.contains("all"));
 }
 
 export class Inputs {

@@ -1,8 +1,12 @@
 // The page: from a slider to what is drawn.
+import { Engine } from "../../engine/engine.js";
 import { Drawing } from "./drawing.js";
 import { Figures, prepared } from "./figures.js";
 import { Inputs, bitTitle, shorter } from "./inputs.js";
 import { short, unitOf } from "./numbers.js";
+import { Judge, RATE } from "./judge.js";
+import { notesOf } from "./notes.js";
+import { Overtaken, Pool } from "./pool.js";
 import { Player } from "./player.js";
 import { numberTexts, rateText, showResult } from "./result.js";
 import { Scene } from "./scene.js";
@@ -13,35 +17,46 @@ const START = { hammer: "dth4", bit: "dth-115", rock: "kuru-granite" };
 // A slower advance is rounding [m/s].
 const LEAST_RATE = 1e-12;
 // Points of a curve, time that a wish may take [ms], and how long the address waits [ms].
-const POINTS = 13, MOST_TIME = 4000, ADDRESS_WAITS = 400;
+const POINTS = 13, MOST_TIME = 8000, ADDRESS_WAITS = 400;
+// Points of a curve are known to this share, and progress is told so often [ms].
+const CURVE_SCATTER = 5e-3, TOLD = 300;
+// Curves have more points where one lies so far off the line between its neighbours, by the greatest rate;
+// no closer than a share of their width, and no more than so many.
+const BEND = 0.01, LEAST_STRETCH = 0.004, MOST_POINTS = 45;
 const CURVES = [["feed.force", "overFeed", "force", "feed"], ["rotation.speed", "overSpeed", "turns", "rotation"]];
 
 const state = { scene: null, found: null, blow: null, pinned: null, imperial: false, asked: 0, shown: 0, curves: {} };
 const table = JSON.parse(part("table").textContent), tables = tablesOf(table, JSON.parse(part("catalogue").textContent));
-let worker, inputs, figures, drawing, player, waiting;
+let pool, judge, inputs, figures, drawing, player, waiting;
 
 function bytes(text) { return Uint8Array.from(atob(text.trim()), letter => letter.charCodeAt(0)); }
 
-// ---- the worker
+// ---- the engine
 
-async function startWorker() {
-  const source = part("worker").textContent;
-  worker = new Worker(URL.createObjectURL(new Blob([source], { type: "text/javascript" })));
-  worker.onmessage = ({ data }) => take(data);
-  worker.onerror = event => { event.preventDefault(); crash(event.message); };
+async function startEngine() {
+  const source = URL.createObjectURL(new Blob([part("worker").textContent], { type: "text/javascript" }));
   const unpacked = new Blob([bytes(part("engine").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const wasm = await new Response(unpacked).arrayBuffer();
-  worker.postMessage({ wasm, table }, [wasm]);
+  const module = await WebAssembly.compile(await new Response(unpacked).arrayBuffer());
+  judge = new Judge(await Engine.load(module, table), tables.settled);
+  pool = new Pool(() => {
+    const worker = new Worker(source);
+    worker.postMessage({ module, table });
+    return worker;
+  }, crash);
+  if (state.asked !== state.shown) send();
 }
 
-// A worker that has died is followed by another, which waits for the next scene.
+// A worker has died at a scene: the next scene has others.
 function crash(why) {
-  worker.terminate();
-  state.ready = false;
-  state.found = { refusal: fill(WORDS.crashed, { why }) };
+  pool.wish(state.asked += 0.5); // nothing more of this one
   state.shown = state.asked;
+  showRefusal(fill(WORDS.crashed, { why }));
+}
+
+function showRefusal(text) {
+  Object.assign(state, { found: { refusal: text }, isOld: true });
+  drawBlow(true);
   showResult(state.found, state.pinned?.found, state.imperial);
-  startWorker();
 }
 
 function fail(why) {
@@ -54,21 +69,6 @@ function tablesOf(table, catalogue) {
   for (const [name, more] of Object.entries(catalogue.bits)) bits[name] = { ...bits[name], ...more };
   const rows = [...table.parameters, ...LENGTHS.map(({ key }) => ({ ...section[0], key, needs: {} }))];
   return { ...catalogue, presets, bits, rocks, section, rows: new Map(rows.map(row => [row.key, row])) };
-}
-
-// A scene, and what the worker must know besides.
-function wishOf(scene) {
-  const transits = scene.bars.map(transit), get = key => scene.get(key), drive = get("effects.drive");
-  return {
-    scene: scene.whole, busy: 1.6 * tables.transits * Math.max(...transits),
-    mostTime: MOST_TIME, tooLong: fill(WORDS.tooLong, { seconds: MOST_TIME / 1000 }),
-    known: {
-      transits: [transits[0], Math.min(...transits)], cells: get("solver.cells"), loss: get("loss.time"), drive,
-      step: get(`${drive}.step`), barrier: get("rock.barrier_threshold"),
-    },
-    curves: CURVES.filter(([key]) => key !== "rotation.speed" || get("effects.rotation")).map(([key]) => ({ key, places: state.curves[key].places })),
-    interval: intervalOf(scene),
-  };
 }
 
 // Time in which a wave crosses a bar [s].
@@ -91,25 +91,145 @@ function intervalOf(scene) {
 
 function ask() {
   const { scene } = state;
-  for (const [key] of CURVES) state.curves[key] = emptyCurve(scene, key);
+  for (const [key] of CURVES) state.curves[key] = curveOf(scene, key);
   state.asked += 1;
   part("result").classList.add("waiting");
   fade(true); // until the next picture
-  if (state.ready) send();
+  if (pool) send();
   clearTimeout(waiting);
   waiting = setTimeout(() => history.replaceState(null, "", `#${scene.link()}`), ADDRESS_WAITS);
 }
 
 function send() {
+  const id = state.asked;
   state.began = performance.now();
-  worker.postMessage({ id: state.asked, ...wishOf(state.scene) });
+  pool.wish(id);
+  answer(id, state.scene).catch(error => {
+    if (error instanceof Overtaken || id !== state.asked) return;
+    state.shown = id;
+    showRefusal(String(error?.message ?? error));
+  });
 }
 
-function emptyCurve(scene, key) {
+// All that is told of a scene: the rate first, then its errors and a picture, then what takes longer.
+async function answer(id, scene) {
+  const { whole } = scene, { known, engine } = judge, job = (work, more, told) => pool.run(id, { work, scene: whole, ...more }, told);
+  const changed = changes => ({ scene: engine.changed(whole, changes) });
+  const others = [], coarse = [];
+  let settled, plan;
+  const compare = grid => { // in time: where blows do not repeat other grids take as long
+    plan = judge.coarser(whole, grid);
+    for (const changes of plan?.all ?? []) {
+      coarse.push(new Promise((done, fail) => { others.push(job("coarse", changed(changes), done)); others.at(-1).catch(fail); }));
+      coarse.at(-1).catch(() => {});
+    }
+  };
+  const rest = await job("settle", { mostTime: MOST_TIME, tooLong: fill(WORDS.tooLong, { seconds: MOST_TIME / 1000 }), fewest: known.fewest }, told => {
+    settled = told.settled;
+    showRate(id, settled ?? { kind: "settling", order: 0, blows: told.soFar });
+    if (told.grid && !state.found.undamped) compare(told.grid);
+  });
+  const found = { ...settled, ...rest }, hasRate = found.kind !== "stalled" && state.found.rate !== 0 && !state.found.undamped;
+  if (hasRate && plan === undefined) compare(found.grid);
+  pool.ends(found.end);
+  const errors = hasRate ? judge.gridErrors(whole, found, plan, coarse, changes => job("run", { ...changed(changes), end: found.end })) : {};
+  if (found.kind !== "stalled") state.found.notes = notesOf(scene, state.found, rest.last, tables.notes);
+  const told = [Promise.resolve(errors).then(grid => {
+    if (id !== state.asked) return;
+    state.found.errors = hasRate ? addVolume(judge.errors(found, state.found.counted, grid)) : {};
+    show();
+  }), Promise.allSettled(pool.hasRoom ? [] : [errors]).then(() => drawNext(job, scene, found))]; // where cores are few, errors come first
+  await Promise.all(told);
+  const motions = await Promise.all(others);
+  if (motions.length && !state.found.undamped) state.found.same = motions.every(one => one.kind === found.kind && one.order === found.order);
+  show();
+  const curves = all => Promise.all(CURVES.map(([key]) => drawCurve(job, key, all[key])));
+  await Promise.all([curves(state.curves), tellInterval(job, scene)]);
+  if (state.pinned) await curves(state.pinned.curves);
+}
+
+function show() { showResult(state.found, state.pinned?.found, state.imperial); }
+
+function showRate(id, found) {
+  const { scene } = state, waits = intervalOf(scene), counted = judge.counted(found), values = found.kind === "stalled" || !counted.length ? {} : judge.values(counted);
+  const rate = found.rate ?? values[RATE];
+  state.found = {
+    ...found, rate: Math.abs(rate) < LEAST_RATE ? 0 : rate, counted, means: addVolume(values), rock: scene.get("effects.rock"), stiffness: scene.get("rock.loading_stiffness") * scene.get("rock.buttons"),
+    undamped: !scene.get("effects.loss") || scene.get("loss.time") === 0,
+    notes: [], interval: waits ? fill(WORDS.rockWaiting, { done: 0, count: waits.samples.length }) : scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing,
+  };
+  Object.assign(state, { shown: id, took: performance.now() - state.began });
+  drawCurves();
+  show();
+}
+
+// The next blow at full rate.
+async function drawNext(job, scene, { state: moving, all }) {
+  const transits = scene.bars.map(transit);
+  const found = await job("picture", { state: moving, busy: 1.6 * tables.transits * Math.max(...transits), transit: Math.min(...transits) });
+  state.isOld = !found;
+  if (found) state.blow = { ...prepared(found, scene), number: all.length + found.number, at: found.at };
+  drawBlow(true);
+}
+
+// Rates over a setting: at even places, then where the curve bends.
+async function drawCurve(job, key, curve) {
+  if (key === "rotation.speed" && !curve.scene.get("effects.rotation")) return;
+  const { engine } = judge, whole = curve.scene.whole;
+  const find = places => Promise.all(places.map(async x => {
+    curve.points.push([x, await job("rate", { scene: engine.changed(whole, { [key]: x }), scatter: CURVE_SCATTER })]);
+    curve.points.sort(([one], [other]) => one - other);
+    drawCurves(key);
+  }));
+  let places = curve.places.filter(x => !curve.points.some(([known]) => known === x));
+  do await find(places); while (curve.points.length < MOST_POINTS && (places = bends(curve).slice(0, MOST_POINTS - curve.points.length)).length);
+}
+
+// Middles of stretches beside points that lie off the line between their neighbours.
+function bends({ points, low, high }) {
+  const rates = points.map(([, y]) => y || 0), most = Math.max(...rates), found = new Set();
+  const middle = k => points[k + 1][0] - points[k][0] > LEAST_STRETCH * (high - low) && found.add(0.5 * (points[k][0] + points[k + 1][0]));
+  for (let k = 1; k + 1 < points.length; k++) {
+    const [[x], [y], [z]] = [points[k - 1], points[k], points[k + 1]], line = rates[k - 1] + (y - x) / (z - x) * (rates[k + 1] - rates[k - 1]);
+    if (Math.abs(rates[k] - line) > BEND * most) [k - 1, k].forEach(middle);
+  }
+  return [...found];
+}
+
+// How far the rate lies off where rock and bit are others within what is known of them, by runs of
+// rigid bodies where there are no rods (analysis/rock_interval.py).
+async function tellInterval(job, scene) {
+  const known = intervalOf(scene), { engine, known: { numbers } } = judge, { duration, settle, ends } = tables.interval;
+  if (!known) return;
+  const rigid = known.isString ? {} : { "piston.model": "rigid", "bit.model": "rigid" }, count = known.samples.length;
+  const sample = values => job("sample", { scene: engine.changed(scene.whole, { ...values, ...rigid }), settle, end: duration, numbers: { [RATE]: numbers[RATE] } });
+  let done = 0, looked = performance.now();
+  const [own, ...found] = await Promise.all([{}, ...known.samples].map(async values => {
+    const rate = await sample(values);
+    done += 1;
+    if (performance.now() - looked < TOLD) return rate;
+    looked = performance.now();
+    state.found.interval = fill(WORDS.rockWaiting, { done: Math.min(done, count), count });
+    show();
+    return rate;
+  }));
+  const shares = found.map(one => one / own).filter(Number.isFinite).sort((a, b) => a - b);
+  if (!shares.length || !(own > 0)) return;
+  const at = share => {
+    const place = share * (shares.length - 1), k = Math.floor(place);
+    return shares[k] + (place - k) * ((shares[k + 1] ?? shares[k]) - shares[k]);
+  };
+  state.found.interval = { rock: shorter(tables.rocks[scene.rock].title), ends: [at(ends), at(1 - ends)] };
+  show();
+}
+
+// Points of a curve that are to be found; those of the curve before where only its own setting has moved.
+function curveOf(scene, key) {
   const slider = SLIDERS.find(one => one.key === key), value = scene.get(key);
-  const low = Math.min(slider.low, value), high = Math.max(slider.high, value);
-  const places = Array.from({ length: POINTS }, (_, k) => low + k / (POINTS - 1) * (high - low));
-  return { low, high, places, points: [] };
+  const low = Math.min(slider.low, value), high = Math.max(slider.high, value), { [key]: _, ...others } = scene.values;
+  const of = JSON.stringify([scene.hammer, scene.bit, scene.rock, others, low, high]), before = state.curves[key];
+  if (before?.of === of) return before;
+  return { of, scene, low, high, places: Array.from({ length: POINTS }, (_, k) => low + k / (POINTS - 1) * (high - low)), points: [] };
 }
 
 // Specific energy beside the energy by advance, where the hole is known.
@@ -117,42 +237,6 @@ function addVolume(numbers) {
   const hole = state.scene.get("hole_diameter");
   if (hole > 0) numbers.specific_energy = numbers.energy_per_advance / (0.25 * Math.PI * hole * hole);
   return numbers;
-}
-
-// Take an answer of the worker.
-function take(answer) {
-  if (answer.ready) {
-    state.ready = true;
-    return state.asked === state.shown ? undefined : send();
-  }
-  if (answer.crashed) return crash(answer.crashed);
-  if (answer.broken) return fail(answer.broken);
-  if (answer.id !== state.asked) return undefined;
-  if (answer.what === "refusal") {
-    Object.assign(state, { found: { refusal: answer.text }, shown: answer.id, isOld: true });
-    drawBlow(true);
-  } else if (answer.what === "rate") {
-    const waits = intervalOf(state.scene);
-    const rate = Math.abs(answer.found.rate) < LEAST_RATE ? 0 : answer.found.rate, undamped = !state.scene.get("effects.loss") || state.scene.get("loss.time") === 0;
-    state.found = { ...answer.found, rate, undamped, rock: state.scene.get("effects.rock"), interval: waits ? fill(WORDS.rockWaiting, { done: 0, count: waits.samples.length }) : state.scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing };
-    addVolume(state.found.means);
-    Object.assign(state, { shown: answer.id, took: performance.now() - state.began });
-    drawCurves();
-  } else if (answer.what === "errors") {
-    Object.assign(state.found, { same: answer.same, errors: addVolume(answer.errors) });
-  } else if (answer.what === "sampled") {
-    state.found.interval = fill(WORDS.rockWaiting, answer);
-  } else if (answer.what === "interval") {
-    state.found.interval = { rock: shorter(tables.rocks[state.scene.rock].title), ends: answer.ends };
-  } else if (answer.what === "picture") {
-    state.isOld = !answer.picture;
-    if (answer.picture) state.blow = prepared(answer.picture, state.scene);
-    return drawBlow(true);
-  } else if (answer.what === "point") {
-    state.curves[answer.curve].points.push([answer.x, answer.rate]);
-    return drawCurves(answer.curve);
-  }
-  return showResult(state.found, state.pinned?.found, state.imperial);
 }
 
 // ---- what is drawn
@@ -191,8 +275,9 @@ function drawCurves(only) {
   }
 }
 
-// Words for those who do not see the pictures.
+// Which blow is drawn, and words for those who do not see the pictures.
 function describe() {
+  part("which").textContent = fill(WORDS.which, { n: state.blow.number, at: state.blow.at.toPrecision(4) });
   const { greatest, period } = state.blow, mega = (1e-6 * greatest.stress).toFixed(0), force = (1e-3 * greatest.bit_force).toFixed(0);
   part("drawing").setAttribute("aria-label", fill(WORDS.drawn, { mega, force }));
   for (const id of ["waves", "forces", "path", "energy"]) part(id).setAttribute("aria-label", fill(WORDS.plotted, { what: part(id).previousElementSibling.textContent, period: (1e3 * period).toFixed(1), force, mega }));
@@ -322,5 +407,5 @@ inputs = new Inputs(() => state.scene, change);
 part("about").textContent = fill(WORDS.about, { version: tables.version });
 listen();
 start(location.hash || `#${part("own").textContent}`);
-globalThis.explorer = { state, tables, player, take, change: values => change(state.scene.with(values)), show: change, Scene };
-startWorker().catch(error => fail(String(error?.message ?? error)));
+globalThis.explorer = { state, tables, player, judge: () => judge, change: values => change(state.scene.with(values)), show: change, Scene };
+startEngine().catch(error => fail(String(error?.message ?? error)));

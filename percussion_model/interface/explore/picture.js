@@ -1,35 +1,22 @@
 // One blow at full rate: what a sample has, and the stress in both bars.
 const STEPS = 24, BUSY_SAMPLES = 1600, QUIET_SAMPLES = 500, BEFORE = 0.02, PATIENCE = 4, PIECE = 200, MOST_COLUMNS = 1000;
 
-// The state of a motion, to come back to.
-function saved(motion) {
-  const { engine, moving, _size: size, time } = motion, words = engine.words(moving, size).slice(), count = motion.blows.length;
-  return () => {
-    engine.words(moving, size).set(words);
-    motion.time = time;
-    motion.blows.length = count;
-  };
-}
-
-// The next whole blow of a motion, which is left as it was; null where there is none.
-export async function picture(motion, { scene, busy: longest, known }, keep) {
-  const restore = saved(motion), count = motion.blows.length;
-  try {
-    motion.runBlows(2, motion.time + PATIENCE);
-    const blow = motion.blows.length > count + 1 ? motion.blows.at(-1) : null;
-    if (!blow) return null;
-    restore();
-    const busy = Math.min(blow.period, longest), start = Math.max(blow.time - BEFORE * blow.period, motion.time);
-    const even = (from, length, many) => Array.from({ length: many }, (_, k) => from + k / many * length);
-    const times = [...even(start, blow.time - start, 20), ...even(blow.time, busy, BUSY_SAMPLES),
-      ...(busy < blow.period ? even(blow.time + busy, blow.period - busy, QUIET_SAMPLES) : []), blow.time + blow.period];
-    const columns = await sampled(motion, times, keep);
-    restore();
-    const fields = await stresses(motion, scene, blow, times, busy, Math.max(Math.min(...known.transits) / STEPS, busy / MOST_COLUMNS), keep);
-    return { time: Float64Array.from(times, t => t - blow.time), columns, fields, period: blow.period, busy };
-  } finally {
-    restore();
-  }
+// The next whole blow of a motion; null where there is none.
+export async function picture(motion, { scene, busy: longest, transit }, keep) {
+  const { state } = motion, { time: begin } = state;
+  motion.runBlows(2, begin + PATIENCE);
+  const blow = motion.blows.length > 1 ? motion.blows.at(-1) : null;
+  if (!blow) return null;
+  const busy = Math.min(blow.period, longest), start = Math.max(blow.time - BEFORE * blow.period, begin);
+  const even = (from, length, many) => Array.from({ length: many }, (_, k) => from + k / many * length);
+  const times = [...even(start, blow.time - start, 20), ...even(blow.time, busy, BUSY_SAMPLES),
+    ...(busy < blow.period ? even(blow.time + busy, blow.period - busy, QUIET_SAMPLES) : []), blow.time + blow.period];
+  const { length: number } = motion.blows;
+  motion.state = state;
+  const columns = await sampled(motion, times, keep);
+  motion.state = state;
+  const fields = await stresses(motion, scene, blow, times, busy, Math.max(transit / STEPS, busy / MOST_COLUMNS), keep);
+  return { time: Float64Array.from(times, t => t - blow.time), columns, fields, period: blow.period, busy, number, at: blow.time };
 }
 
 // Samples in pieces.

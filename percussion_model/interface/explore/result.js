@@ -11,7 +11,7 @@ const part = id => document.getElementById(id);
 export function motionWords(found) {
   const { kind, order, counted } = found;
   const said = kind === "periodic" ? (order === 1 ? WORDS.kinds.once : fill(WORDS.kinds.cycle, { n: order }))
-    : fill(WORDS.kinds[kind], { n: counted });
+    : fill(WORDS.kinds[kind], { n: counted.length });
   const more = (found.rate === 0 ? WORDS.nothing[found.rock] ?? WORDS.nothing.bilinear : "") + (found.undamped ? WORDS.undamped : "");
   return said + more + (found.same === true ? WORDS.sameMotion : found.same === false ? WORDS.otherMotion : "");
 }
@@ -47,17 +47,34 @@ export function showResult(found, pinned, imperial) {
   part("refusal").textContent = found.refusal ?? "";
   if (found.refusal) {
     part("rate").textContent = "–";
-    for (const id of ["numerical", "range", "motion", "rock-error", "numbers"]) part(id).textContent = "";
+    for (const id of ["numerical", "range", "motion", "why", "notes", "rock-error", "numbers"]) part(id).textContent = "";
     return;
   }
   const [rate, error] = rateText(found, imperial);
   part("rate").textContent = rate;
   part("numerical").textContent = !found.rate ? "" : found.undamped ? error : found.errors ? (error ? fill(WORDS.numerical, { error }) : found.errors.rate_of_penetration === undefined ? WORDS.errorUnknown : "") : WORDS.noError;
   part("motion").textContent = motionWords(found);
+  part("why").textContent = whyWords(found, pinned, imperial);
+  part("notes").replaceChildren(...found.notes.map(text => Object.assign(document.createElement("p"), { className: "refusal", textContent: text })));
   [part("range").textContent, part("rock-error").textContent] = rockWords(found, imperial);
   const others = new Map(pinned ? numberTexts(pinned, imperial) : []);
   part("numbers").innerHTML = numberTexts(found, imperial).map(([name, text]) =>
     `<div><dt>${name}</dt><dd>${text}</dd>${others.has(name) ? `<dd class="pinned">${others.get(name)}</dd>` : ""}</div>`).join("");
+}
+
+// Where the energy of a blow goes, and what makes the rate another than the pinned one: the rate is the
+// product of blows per second, energy of a blow, share into the rock, and advance by that energy.
+function whyWords(found, pinned, imperial) {
+  const parts = one => {
+    const { percussive_power: power, blow_frequency: frequency, transfer_efficiency: share, energy_per_advance: by } = one.means;
+    return { frequency, blow: power / frequency, share, depth: 1 / (by * share) };
+  };
+  if (!found.rate || found.undamped) return "";
+  const own = parts(found), [unit, factor] = unitOf("length", imperial), blow = own.blow * own.share * own.depth;
+  const said = fill(WORDS.energyOf, { blow: inDigits(own.blow), share: inDigits(100 * own.share), advance: inDigits(factor * blow), unit });
+  if (!pinned?.rate || pinned.undamped) return said;
+  const before = parts(pinned), shares = Object.fromEntries(Object.keys(own).map(name => [name, inDigits(own[name] / before[name])]));
+  return `${said} ${fill(WORDS.against, shares)}${found.stiffness > pinned.stiffness ? WORDS.softer : ""}`;
 }
 
 function rockWords(found, imperial) {

@@ -1,19 +1,16 @@
-// The worker: answers the newest wish of the page, the rate first, then all that takes longer.
+// A worker: does one job after the other, and gives up what is for an older wish.
 import { Engine, EngineError } from "../../engine/engine.js";
-import { afterSettling, numbersOver, rateOfBlows, settle } from "./settle.js";
-import { LONGEST, errorsOf, withErrors } from "./grid_error.js";
+import { runTo, runToBlows, settle } from "./settle.js";
 import { keepTables } from "./kept.js";
 import { picture } from "./picture.js";
 
 class Overtaken extends Error {}
 
-let engine, newest = 0;
+let engine, newest = 0, known = {}; // until when coarser grids are compared, by the wish
 // How often messages are heard [ms], and blows after which a rate so far is told.
 const TURN = 30, SOME = 16;
-// How often progress is told [ms].
-const TOLD = 300;
-// Runs of rigid bodies that tell how the rate changes with the rock [s].
-const DURATION = 2, SETTLE = 0.5;
+// How often a worker that waits looks again [ms].
+const WAIT = 5;
 
 // Let messages come in; throw where something newer is wished.
 async function pause(id) {
@@ -22,117 +19,118 @@ async function pause(id) {
     port1.onmessage = done;
     port2.postMessage(0);
   });
-  if (id !== newest) throw new Overtaken();
+  if (id < newest) throw new Overtaken();
 }
 
-onmessage = async ({ data }) => {
-  if (data.wasm) {
-    try {
-      engine = keepTables(await Engine.load(data.wasm, data.table));
-      postMessage({ ready: true });
-    } catch (error) {
-      postMessage({ broken: String(error?.message ?? error) });
-    }
-    return;
-  }
-  newest = data.id;
-  try {
-    await answer(data);
-  } catch (error) {
-    if (error instanceof WebAssembly.RuntimeError) postMessage({ crashed: String(error.message) });
-    else if (!(error instanceof Overtaken)) postMessage({ id: data.id, what: "refusal", text: String(error?.message ?? error) });
-  }
-};
+const begun = new Promise(ready => {
+  onmessage = async ({ data }) => {
+    if (data.module) engine = keepTables(await Engine.load(data.module, data.table));
+    if (data.module) return ready();
+    if (data.end !== undefined) known = data;
+    newest = data.newest ?? data.id;
+    return data.work && answer(data);
+  };
+});
 
-async function answer(wish) {
-  const { id } = wish, tell = (what, more) => postMessage({ id, what, ...more }), began = performance.now();
-  let looked = began, told = false;
+async function answer(job) {
+  const { id, number } = job, tell = told => postMessage({ number, told });
+  let looked = performance.now();
   const keep = async () => { // hear of newer wishes now and then
     if (performance.now() - looked < TURN) return;
     await pause(id);
     looked = performance.now();
   };
-  const watch = async blows => {
-    const taken = performance.now() - began;
-    if (taken > wish.mostTime) throw new Error(wish.tooLong);
-    if (!told && taken > TURN && blows.length > SOME) {
-      const counted = afterSettling(blows);
-      told = tellRate(tell, { kind: "settling", order: 0, rate: rateOfBlows(counted)[0], counted, blows });
-    }
-    await keep();
-  };
-  await pause(id);
-  const motion = engine.create(wish.scene), start = changes => engine.create(engine.changed(wish.scene, changes));
   try {
-    const found = await settle(motion, watch);
-    tellRate(tell, found);
-    await pause(id);
-    tell("picture", { picture: await picture(motion, wish, keep) });
-    tell("errors", await errors(found, motion, wish, start, keep));
-    for (const { key, places } of wish.curves) {
-      for (const x of places) tell("point", { curve: key, x, rate: await rateAt(() => start({ [key]: x }), keep) });
-    }
-    if (wish.interval) await interval(wish, start, tell, keep);
+    await begun;
+    postMessage({ number, found: await works[job.work](job, keep, tell) });
+  } catch (error) {
+    if (error instanceof WebAssembly.RuntimeError) postMessage({ crashed: String(error.message) });
+    else postMessage(error instanceof Overtaken ? { number, overtaken: true } : { number, refusal: String(error?.message ?? error) });
+  }
+}
+
+// A motion of a scene for as long as it is used.
+async function withMotion(scene, use) {
+  const motion = engine.create(scene);
+  try {
+    return await use(motion);
   } finally {
     motion.free();
   }
 }
 
-// Rigid bodies move in closed form; how far waves are off is known to the package alone.
-async function errors(found, motion, { known, scene }, start, keep) {
-  const hasRate = found.kind !== "stalled" && found.rate !== 0;
-  if (hasRate && motion.solver === "modal" && (scene.values["solver.accuracy"] ?? null) === null) return withErrors(found, motion, known, start, keep);
-  return { errors: hasRate && motion.solver === "rigid" && !LONGEST[known.drive] ? errorsOf(found, {}) : {} };
-}
+const works = {
+  // Settle, and run on to so many blows as errors need.
+  settle: ({ scene, mostTime, tooLong, fewest }, keep, tell) => withMotion(scene, async motion => {
+    const began = performance.now();
+    let said = false;
+    const found = await settle(motion, async blows => {
+      const taken = performance.now() - began;
+      if (taken > mostTime) throw new Error(tooLong);
+      if (!said && taken > TURN && blows.length > SOME) {
+        said = true;
+        tell({ soFar: blows, grid: motion.grid() });
+      }
+      await keep();
+    });
+    const blows = motion.blows.slice();
+    tell({ settled: { ...found, blows } });
+    const { state, time } = motion, last = Object.fromEntries(Object.entries(motion.sample([time])).map(([name, [value]]) => [name, value]));
+    motion.state = state; // samples at the end of it
+    if (found.kind !== "stalled") runToBlows(motion, fewest);
+    return { all: motion.blows, end: motion.time, last: { ...last, time }, state: motion.state, grid: motion.grid(), numerical: motion.numericalShare() };
+  }),
 
-function tellRate(tell, { kind, order, rate, multiplier, counted, blows }) {
-  const means = kind === "stalled" || !counted.length ? {} : numbersOver(counted);
-  tell("rate", { found: { kind, order, rate, multiplier, counted: counted.length, blows, means } });
-  return true;
-}
+  // The same on a coarser grid: blows to a time as soon as they are there and the time is known, then
+  // how it settles.
+  coarse: ({ scene, id }, keep, tell) => withMotion(scene, async motion => {
+    let said = false;
+    const say = () => {
+      if (said || known.id !== id || motion.time < known.end) return;
+      tell({ blows: motion.blows.slice(), grid: motion.grid() });
+      said = true;
+    };
+    const { kind, order } = await settle(motion, async () => {
+      say();
+      await keep();
+    });
+    while (known.id !== id) {
+      await new Promise(done => setTimeout(done, WAIT));
+      await keep();
+    }
+    await runTo(motion, known.end, keep);
+    say();
+    return { kind, order };
+  }),
 
-async function rateAt(begin, keep) {
-  let one;
+  // Blows to a time.
+  run: ({ scene, end }, keep) => withMotion(scene, async motion => {
+    await runTo(motion, end, keep);
+    return { blows: motion.blows, grid: motion.grid() };
+  }),
+
+  // A blow at full rate, from a state on.
+  picture: (job, keep) => withMotion(job.scene, motion => {
+    motion.state = job.state;
+    return picture(motion, job, keep);
+  }),
+
+  // The settled rate alone, NaN where there is none.
+  rate: ({ scene, scatter }, keep) => orNone(() => withMotion(scene, async motion => (await settle(motion, keep, scatter)).rate)),
+
+  // The rate over a stretch of time, NaN where there is none; numbers: its definition.
+  sample: ({ scene, settle: from, end, numbers }, keep) => orNone(() => withMotion(scene, async motion => {
+    await runTo(motion, end, keep);
+    const blows = motion.blows.filter(blow => blow.time >= from && blow.time + blow.period <= end);
+    return Object.values(engine.numbersOver(blows, numbers))[0].value;
+  })),
+};
+
+async function orNone(use) {
   try {
-    one = begin();
-    return (await settle(one, keep)).rate;
+    return await use();
   } catch (error) {
     if (!(error instanceof EngineError)) throw error;
-    return NaN; // that point has no rate
-  } finally {
-    one?.free();
+    return NaN;
   }
-}
-
-// How far the rate lies off where rock and bit are others within what is known of them, by runs of
-// rigid bodies where there are no rods (analysis/rock_interval.py).
-async function interval(wish, start, tell, keep) {
-  const rigid = values => {
-    const one = start(wish.interval.isString ? values : { ...values, "piston.model": "rigid", "bit.model": "rigid" });
-    try {
-      one.runUntil(DURATION);
-      return rateOfBlows(one.blows.filter(blow => blow.time >= SETTLE && blow.time + blow.period <= DURATION))[0];
-    } catch (error) {
-      if (!(error instanceof EngineError)) throw error;
-      return NaN; // that sample has no rate
-    } finally {
-      one.free();
-    }
-  };
-  const own = rigid({}), found = [];
-  let told = performance.now();
-  for (const sample of wish.interval.samples) {
-    await keep();
-    if (performance.now() - told > TOLD) {
-      told = performance.now();
-      tell("sampled", { done: found.length, count: wish.interval.samples.length });
-    }
-    found.push(rigid(sample) / own);
-  }
-  const known = found.filter(Number.isFinite).sort((a, b) => a - b);
-  const at = share => {
-    const place = share * (known.length - 1), k = Math.floor(place);
-    return known[k] + (place - k) * ((known[k + 1] ?? known[k]) - known[k]);
-  };
-  if (known.length && own > 0) tell("interval", { ends: [at(0.05), at(0.95)] });
 }
