@@ -23,6 +23,7 @@ needs_browser = pytest.mark.skipif(
 )
 LARGEST = 4_000_000  # [bytes]
 MODEL = "Bokeh.documents[0].get_model_by_name"
+SHORT = Scene(title="A <short> run", run={"duration": 0.3, "settle": 0.1})
 SCENE = Scene(title="rigid <bodies>").computed_by("rigid")
 AXES = {
     "feed.force": np.linspace(1500.0, 6000.0, 4),
@@ -52,8 +53,7 @@ def self_contained(path):
 
 @pytest.fixture(scope="module")
 def run_page(tmp_path_factory):
-    scene = Scene(title="A <short> run", run={"duration": 0.3, "settle": 0.1})
-    return write_report(simulate(scene), tmp_path_factory.mktemp("run"))
+    return write_report(simulate(SHORT), tmp_path_factory.mktemp("run"))
 
 
 @pytest.fixture(scope="module")
@@ -65,23 +65,36 @@ def test_a_run_page_is_self_contained(run_page):
     assert self_contained(run_page)
     text = run_page.read_text(encoding="utf-8")
     assert "<short>" not in text
-    assert text.count("<figcaption>") == 4
+    assert text.count("<figcaption><strong>") == 4
 
 
 @needs_browser
-def test_a_dragged_box_zooms_the_figures_of_a_run(run_page, tmp_path):
-    ask = f"{MODEL}('Rate of penetration of each blow').x_range.end"
-    before, after, other = opened(
+def test_the_last_blow_of_a_run_is_moved_through(run_page, tmp_path):
+    """The greatest force is that of the table of blows, and time is chosen in a plot."""
+    first, after, greatest = opened(
         run_page,
         tmp_path,
-        ask,
-        Drag(0, (0.15, 0.06), (0.3, 0.14)),
-        ask,
-        f"{MODEL}('Period of each blow').x_range.end",
+        "report.player.t",
+        Drag(1, (0.5, 0.5), (0.9, 0.5)),
+        "report.player.t",
+        "report.blow.greatest.bit_force",
     )
-    assert before == pytest.approx(0.3)
-    assert 0.02 < after < 0.25
-    assert other == after
+    assert first < after < 1.3e-3
+    blows = simulate(SHORT).blows
+    assert greatest == pytest.approx(blows["peak_bit_force"][-1], rel=2e-3)
+
+
+@needs_browser
+def test_a_dragged_box_enlarges_a_drawing(run_page, tmp_path):
+    ask = "document.querySelector('figure svg').getAttribute('viewBox').split(' ').map(Number)"
+    again = "document.querySelector('figure svg').dispatchEvent(new Event('dblclick'))"
+    number = 4  # drawings follow the plots of the blow
+    before, near, _, after = opened(
+        run_page, tmp_path, ask, Drag(number, (0.15, 0.06), (0.35, 0.16)), ask, again, ask
+    )
+    assert near[2] == pytest.approx(0.2 * before[2], rel=0.05)
+    assert before[0] < near[0] < near[0] + near[2] < before[0] + before[2]
+    assert after == before
 
 
 @needs_browser

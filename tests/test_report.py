@@ -48,11 +48,9 @@ class Outline(HTMLParser):
 
 @pytest.fixture(scope="module", params=SCENES)
 def case(request, tmp_path_factory):
-    """A scene and its page with still pictures."""
+    """A scene and its page."""
     result = simulate(SCENES[request.param])
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "why_not_interactive", lambda: "zoom is missing")
-        path = write_report(result, tmp_path_factory.mktemp("report"))
+    path = write_report(result, tmp_path_factory.mktemp("report"))
     return request.param, result, path.read_text(encoding="utf-8")
 
 
@@ -60,9 +58,9 @@ def test_page_needs_nothing_else(case):
     _, _, page = case
     outline = Outline(page)
     assert "://" not in page
-    assert "script" not in outline.tags
+    assert "link" not in outline.tags
     assert all(target.startswith(("#", "data:image/png;base64,")) for target in outline.targets)
-    assert "Still pictures: zoom is missing" in page
+    assert ("blow-data" in outline.ids) == (case[0] != "drop")  # no piston, no blow
 
 
 def test_what_is_missing_for_zoom_is_said(monkeypatch):

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from percussion_model.analysis.drill_string import Extreme
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
 from percussion_model.components import COMPONENTS
+from percussion_model.interface.explore import blow
 from percussion_model.interface.pages import filled
 from percussion_model.interface.plotting import CAPTIONS, figures, watched_string
 from percussion_model.interface.plotting.window import (
@@ -170,6 +171,9 @@ STUDY_CAPTIONS = {
         f"{KNOWN_ERRORS}."
     ),
 }
+# How to look closer at figures.
+DRAWN = "Drag a box to look closer, double-click to see all again."
+OF_BOKEH = "Drag a box to zoom, double-click to go back; further tools appear beside each figure."
 # So many failed points are listed.
 MOST_FAILURES = 10
 PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib", "bokeh")
@@ -203,7 +207,7 @@ def write_report(
 ) -> Path:
     """Write `report.html`, which needs no other file and no network.
 
-    Figures can be zoomed; without bokeh they are the drawings.
+    The last blow can be moved through; a dragged box enlarges what is drawn.
 
     Parameters
     ----------
@@ -240,13 +244,7 @@ def render_report(result: Result, drawings: Sequence[Path], rock_interval: str =
     rock_interval : str
     """
     blocks = {path.stem: _inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
-    remark, scripts, blow = why_not_interactive(), "", last_blow(result)
-    if not remark:
-        from percussion_model.interface.plotting.interactive import embedded
-        from percussion_model.interface.plotting.interactive_run import interactive_figures
-
-        places, scripts = embedded(interactive_figures(result, blow))
-        blocks |= {name: Markup(place) for name, place in places.items()}
+    shown = last_blow(result)
     summary = result.summary()
     scene = result.scene
     # The run may have other times than the scene.
@@ -262,12 +260,15 @@ def render_report(result: Result, drawings: Sequence[Path], rock_interval: str =
         headlines=headline_rows(summary),
         about_errors=about_errors(summary),
         rock_interval=rock_interval,
-        stress=stress_note(result, blow),
+        stress=stress_note(result, shown),
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],
-        zoomable=not remark,
-        remark=remark,
-        scripts=Markup(scripts),
+        zoomable=DRAWN,
+        remark="",
+        scripts=blow.script(),
+        blow=blow.data(shown[0]) if shown and result.scene.piston.model != "absent" else "",
+        places=blow.places(),
+        style=blow.style(),
         ledger=ledger_rows(result.energy),
         computing=_computing_rows(result),
     )  # fmt: skip
@@ -418,7 +419,8 @@ def render_study_report(found: Study) -> str:
         ],
         failed=len(failed),
         figures=blocks,
-        zoomable=bool(blocks),
+        zoomable=OF_BOKEH if blocks else "",
+        style="",
         remark=remark,
         scripts=Markup(scripts),
     )  # fmt: skip

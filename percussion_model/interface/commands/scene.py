@@ -311,10 +311,8 @@ def _draw(result: Result, folder: Path, report: Report, told_by_rock: str) -> li
     files: list[Path] = []
     with common.if_drawable():
         from percussion_model.interface.plotting import figures
-        from percussion_model.interface.report import why_not_interactive, write_report
+        from percussion_model.interface.report import write_report
 
-        if remark := why_not_interactive():
-            common.print_message(remark)
         files += figures(result, folder, report)
         report("writing the report", None)
         files.append(write_report(result, folder, files, told_by_rock))

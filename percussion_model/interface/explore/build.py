@@ -108,17 +108,18 @@ def page(engine: Path) -> str:
     packed = gzip.compress((engine / "engine.wasm").read_bytes(), 9, mtime=0)
     own = wasm.SCRIPT.read_text("utf-8")
     parts = {
-        "STYLE": _source("style.css"),
-        "TABLE": _as_json(_less(table())),
-        "CATALOGUE": _as_json(catalogue()),
+        "STYLE": source("figures.css") + source("style.css"),
+        "TABLE": as_json(_less(table())),
+        "CATALOGUE": as_json(catalogue()),
         "ENGINE": base64.b64encode(packed).decode(),
-        "WORKER": joined({"engine": own} | {name: _source(f"{name}.js") for name in WORKER}),
-        "PAGE": joined({"engine": own} | {name: _source(f"{name}.js") for name in PAGE}),
+        "WORKER": joined({"engine": own} | {name: source(f"{name}.js") for name in WORKER}),
+        "PAGE": joined({"engine": own} | {name: source(f"{name}.js") for name in PAGE}),
     }
-    return re.sub(r"/\*([A-Z]+)\*/", lambda found: parts[found[1]], _source("index.html"))
+    return re.sub(r"/\*([A-Z]+)\*/", lambda found: parts[found[1]], source("index.html"))
 
 
-def _as_json(value: Any) -> str:
+def as_json(value: Any) -> str:
+    """A value for use within a page."""
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
 
 
@@ -150,7 +151,8 @@ def own_link(scene: Scene) -> str:
     return f"own={letters.decode().rstrip('=')}"
 
 
-def _source(name: str) -> str:
+def source(name: str) -> str:
+    """Text of a file of the page."""
     return (HERE / name).read_text("utf-8")
 
 

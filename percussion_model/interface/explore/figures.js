@@ -1,7 +1,7 @@
 // Plots of one blow, and of the rate over feed and rotation.
 import { Plot, colour } from "./plot.js";
 import { short, unitOf } from "./numbers.js";
-import { WORDS } from "./words.js";
+import { WORDS, fill } from "./words.js";
 
 // Index of the last time that is not after t.
 export function before(times, t) {
@@ -32,14 +32,20 @@ const LONG = 3;
 
 export class Figures {
   constructor(scrub, choose) {
-    const canvas = id => document.getElementById(id);
-    this.waves = new Plot(canvas("waves"), ms => scrub(1e-3 * ms));
+    const part = id => document.getElementById(id), overTime = id => new Plot(part(id), ms => scrub(1e-3 * ms));
+    Object.assign(this, { waves: overTime("waves"), forces: overTime("forces"), path: new Plot(part("path")), energy: overTime("energy"), values: part("values") });
     this.waves.halo = true;
-    this.forces = new Plot(canvas("forces"), ms => scrub(1e-3 * ms));
-    this.path = new Plot(canvas("path"));
-    this.energy = new Plot(canvas("energy"), ms => scrub(1e-3 * ms));
-    this.overFeed = new Plot(canvas("over-feed"), x => choose("feed.force", x));
-    this.overSpeed = new Plot(canvas("over-speed"), x => choose("rotation.speed", x));
+    if (!choose) return; // a blow alone
+    this.overFeed = new Plot(part("over-feed"), x => choose("feed.force", x));
+    this.overSpeed = new Plot(part("over-speed"), x => choose("rotation.speed", x));
+  }
+
+  // Words for those who do not see the pictures.
+  describe() {
+    const { greatest, period } = this.blow, mega = (1e-6 * greatest.stress).toFixed(0), force = (1e-3 * greatest.bit_force).toFixed(0);
+    const say = (id, text, more) => document.getElementById(id).setAttribute("aria-label", fill(text, { mega, force, ...more }));
+    say("drawing", WORDS.drawn);
+    for (const id of ["waves", "forces", "path", "energy"]) say(id, WORDS.plotted, { what: document.getElementById(id).previousElementSibling.textContent, period: (1e3 * period).toFixed(1) });
   }
 
   // Plots of a blow between two times; pinned is another one or null.
@@ -133,8 +139,10 @@ export class Figures {
     for (const plot of [this.waves, this.forces, this.energy]) plot.frame(1e3 * t);
     const blow = this.blow;
     if (!blow) return;
-    const depth = unitOf("length", this.imperial)[1] * at(blow.time, blow.depth, t);
-    this.path.frame(depth, unitOf("load", this.imperial)[1] * at(blow.time, blow.columns.bit_force, t));
+    const [mm, length] = unitOf("length", this.imperial), [unit, load] = unitOf("load", this.imperial);
+    const value = name => at(blow.time, blow.columns[name], t), depth = length * at(blow.time, blow.depth, t);
+    this.path.frame(depth, load * value("bit_force"));
+    this.values.textContent = fill(WORDS.values, { rock: short(load * value("bit_force"), 3), piston: short(load * value("contact_force"), 3), unit, depth: short(depth, 3), mm });
   }
 
   // Rate over one setting, with a dot where the hammer is.
@@ -150,6 +158,11 @@ export class Figures {
     plot.frame(factor * now[0], Number.isFinite(now[1]) ? rate * now[1] : 0);
     plot.canvas.setAttribute("aria-label", `${name}: ${known.map(([x, y]) => `${short(factor * x, 3)} ${unit} ${short(rate * y, 3)} ${per}`).join(", ")}`);
   }
+}
+
+// Between which times a blow is shown: all of it, or while waves are busy.
+export function stretch(blow, whole) {
+  return whole ? [blow.time[0], blow.period] : [Math.max(blow.time[0], -0.05 * blow.busy), Math.min(blow.busy, blow.period)];
 }
 
 // What a picture of the worker lacks: greatest values, depths and energies.

@@ -1,7 +1,7 @@
 // The page: from a slider to what is drawn.
 import { Engine } from "../../engine/engine.js";
 import { Drawing } from "./drawing.js";
-import { Figures, prepared } from "./figures.js";
+import { Figures, prepared, stretch } from "./figures.js";
 import { Inputs, bitTitle, shorter } from "./inputs.js";
 import { short, unitOf } from "./numbers.js";
 import { Judge, RATE } from "./judge.js";
@@ -241,10 +241,7 @@ function addVolume(numbers) {
 
 // ---- what is drawn
 
-function range() {
-  const { blow } = state, whole = part("view").value === "blow";
-  return whole ? [blow.time[0], blow.period] : [Math.max(blow.time[0], -0.05 * blow.busy), Math.min(blow.busy, blow.period)];
-}
+const range = () => stretch(state.blow, part("view").value === "blow");
 
 // Whether what shows a blow is faded, as that of another scene.
 function fade(isOld) {
@@ -264,7 +261,8 @@ function drawBlow(keep) {
   player.take(range(), keep && !first, time[columns.bit_force.indexOf(greatest.bit_force)]);
   state.drawn = true;
   if (first && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.playOnce();
-  describe();
+  part("which").textContent = fill(WORDS.which, { n: state.blow.number, at: state.blow.at.toPrecision(4) });
+  figures.describe();
 }
 
 function drawCurves(only) {
@@ -273,14 +271,6 @@ function drawCurves(only) {
     if ((only && only !== key) || (key === "rotation.speed" && part("turning").hidden)) continue;
     figures.drawRates(figures[plot], state.curves[key], state.pinned?.curves[key], [state.scene.get(key), state.found?.rate], kind, name, state.imperial);
   }
-}
-
-// Which blow is drawn, and words for those who do not see the pictures.
-function describe() {
-  part("which").textContent = fill(WORDS.which, { n: state.blow.number, at: state.blow.at.toPrecision(4) });
-  const { greatest, period } = state.blow, mega = (1e-6 * greatest.stress).toFixed(0), force = (1e-3 * greatest.bit_force).toFixed(0);
-  part("drawing").setAttribute("aria-label", fill(WORDS.drawn, { mega, force }));
-  for (const id of ["waves", "forces", "path", "energy"]) part(id).setAttribute("aria-label", fill(WORDS.plotted, { what: part(id).previousElementSibling.textContent, period: (1e3 * period).toFixed(1), force, mega }));
 }
 
 function change(scene) {

@@ -31,6 +31,7 @@ export const WORDS = {
   energyOf: "Each blow carries {blow} J; {share} % of it goes into the rock, and the hole advances {advance} {unit} for it.",
   against: "Why another rate than pinned: blows per second × {frequency}, energy of a blow × {blow}, share into the rock × {share}, advance for the same energy in the rock × {depth}.",
   softer: " A stiffer rock is pressed in less by the same energy.",
+  values: "{rock} {unit} on the rock, {piston} {unit} on the bit, {depth} {mm} deep",
   which: "Blow {n} of the run, from {at} s on.",
   all: "All {n}", fewer: "Fewer",
   oldBlow: "The pictures show the last blow that was computed.",

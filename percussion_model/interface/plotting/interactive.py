@@ -1,29 +1,17 @@
-"""Interactive figures (bokeh): panels, lines, and their embedding in a page."""
+"""Interactive figures of studies (bokeh): panels, and their embedding in a page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from itertools import pairwise
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 from bokeh.embed import components
-from bokeh.models import (
-    BoxAnnotation,
-    ColumnDataSource,
-    CustomJS,
-    HoverTool,
-    LayoutDOM,
-    Span,
-    Widget,
-)
+from bokeh.models import CustomJS, LayoutDOM, Widget
 from bokeh.plotting import figure
 from bokeh.resources import Resources
 
 from percussion_model.interface.plotting import style
 
-# Longer lines are thinned: as much as a wide screen can show after a deep zoom.
-MOST_POINTS = 12_000
 HEIGHT = 260
 TOOLS = "pan,box_zoom,wheel_zoom,save,reset"
 
@@ -46,55 +34,6 @@ def panel(title: str, x: str, y: str, **more: Any) -> Any:
         axis.minor_tick_line_color = None
     made.grid.grid_line_color = "#E6E6E6"
     return made
-
-
-def source(**columns: Any) -> ColumnDataSource:
-    """Columns of numbers that a page carries with single precision, which no eye can tell."""
-    return ColumnDataSource(
-        {name: np.asarray(values, dtype=np.float32) for name, values in columns.items()}
-    )
-
-
-def line(to: Any, x: np.ndarray, y: np.ndarray, colour: str, **more: Any) -> Any:
-    """Draw a line, thinned so that each rise and fall is kept."""
-    kept = thinned(y)
-    columns = source(x=x[kept], y=y[kept])
-    return to.line("x", "y", source=columns, color=colour, line_width=1.6, **more)
-
-
-def thinned(values: np.ndarray) -> np.ndarray:
-    """Indices of at most `MOST_POINTS` values: in each stretch the first, least and greatest."""
-    count = len(values)
-    if count <= MOST_POINTS:
-        return np.arange(count)
-    edges = np.linspace(0, count, MOST_POINTS // 3 + 1).astype(int)
-    kept = [0, count - 1]
-    for start, end in pairwise(edges):
-        part = values[start:end]
-        if np.isfinite(part).any():
-            kept += [start, start + int(np.nanargmin(part)), start + int(np.nanargmax(part))]
-        else:
-            kept.append(start)  # a gap stays a gap
-    return np.unique(kept)
-
-
-def hover(to: Any, drawn: Any, *shown: tuple[str, str]) -> None:
-    """Show numbers beside the pointer."""
-    to.add_tools(HoverTool(renderers=[drawn], tooltips=list(shown), mode="vline"))
-
-
-def shade(to: Any, stretches: Iterable[tuple[float, float]], colour: str) -> None:
-    """Shade stretches of the horizontal axis."""
-    for left, right in stretches:
-        to.add_layout(
-            BoxAnnotation(left=left, right=right, fill_color=colour, fill_alpha=0.6,
-                          line_color=None, level="underlay")
-        )  # fmt: skip
-
-
-def rule(to: Any, value: float, colour: str) -> None:
-    """Draw a dashed line across the panel."""
-    to.add_layout(Span(location=value, dimension="width", line_color=colour, line_dash="dashed"))
 
 
 def legend(to: Any, place: str = "above") -> None:
