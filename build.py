@@ -208,13 +208,33 @@ def test(extra: list[str]) -> int:
     return next((code for code in codes if code), 0)
 
 
-def wheels(extra: list[str]) -> int:
-    """Build wheels with compiled solvers, of all platforms or those named."""
+def linker() -> int:
+    """Install all, and what links for other platforms."""
     code = install()
     if code == 0 and call([tool("python"), "-c", "import ziglang"]) != 0:
         code = call([tool("python"), "-m", "pip", "--disable-pip-version-check", "install", "-q",
                      "-e", ".[native]"], silent="installing a linker")  # fmt: skip
-    return code or call([tool("python"), "-m", "fmu_src.wheels", *extra])
+    return code
+
+
+def wheels(extra: list[str]) -> int:
+    """Build wheels with compiled solvers, of all platforms or those named."""
+    return linker() or call([tool("python"), "-m", "fmu_src.wheels", *extra])
+
+
+def page(extra: list[str]) -> int:
+    """Make the page that runs the hammer, and test it in a browser, with its long tests."""
+    make = [
+        tool("python"),
+        "-c",
+        "from percussion_model.interface.explore.build import page_file; print(page_file())",
+    ]
+    tests = ["tests/test_explore.py", "tests/test_wasm.py"]
+    return (
+        linker()
+        or call(make, silent="compiling for browsers")
+        or call([tool("pytest"), *tests, *extra], PERCUSSION_LONG="1")
+    )
 
 
 def bench(extra: list[str]) -> int:
@@ -272,6 +292,7 @@ def main(arguments: list[str]) -> int:
     commands.add_parser("docs", help="build the documentation site; more goes to sphinx-build")
     commands.add_parser("wheels", help="build wheels with compiled solvers: PLATFORMS, -o FOLDER",
                         add_help=False)  # fmt: skip
+    commands.add_parser("page", help="make the page that runs the hammer, and test it in a browser")
     commands.add_parser("bench", help="measure speed; more goes to the benchmarks")
     choice, extra = parser.parse_known_args(arguments)
     started = time.monotonic()
@@ -283,7 +304,8 @@ def main(arguments: list[str]) -> int:
             print(f".venv is {'up to date' if code == 0 else 'not ready'} "
                   f"({time.monotonic() - started:.1f} s).")  # fmt: skip
             return code
-        work = {"run": run, "docs": docs, "test": test, "bench": bench, "wheels": wheels}
+        work = {"run": run, "docs": docs, "test": test, "bench": bench, "wheels": wheels,
+                "page": page}  # fmt: skip
         if choice.command not in work:
             return percussion(choice.command, extra)
         return work[choice.command](extra)

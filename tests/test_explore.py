@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
+import os
 import random
 
 import pytest
@@ -14,7 +15,7 @@ from percussion_model.engine.compiler import NoCompilerError
 from percussion_model.interface.cli import app
 from percussion_model.interface.explore.build import engine_folder, own_link, page, with_scene
 from percussion_model.scene.bits import bit
-from percussion_model.scene.hammers import hammer
+from percussion_model.scene.hammers import hammer, with_chambers
 from percussion_model.scene.rocks import rock, rocks
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.scene import Scene
@@ -26,7 +27,8 @@ pytest.importorskip("tornado", reason="a browser is driven through tornado, whic
 pytestmark = pytest.mark.skipif(
     find_browser() is None, reason="no Chromium is installed to open pages with"
 )
-SETTINGS, SURVIVED = 10, 40
+LONG = os.environ.get("PERCUSSION_LONG") == "1"  # as `build.py page` has it
+SETTINGS, SURVIVED = (40, 1000) if LONG else (10, 40)
 HAMMERS = {
     "reference": ("dth-90",),
     "dth3": ("dth-90",),
@@ -173,13 +175,18 @@ def test_a_link_holds_the_scene_and_is_written_as_toml(built, tmp_path):
     assert again.endswith(link)
 
 
-MEANS = "[explorer.state.found.rate, explorer.state.found.means.impact_velocity]"
+MEANS = (
+    "(({found: {rate, means, errors}}) => [rate, means.impact_velocity, means.transfer_efficiency,"
+    "errors.rate_of_penetration, errors.impact_velocity, errors.blow_period])(explorer.state)"
+)
+ERRORS_OF = ("rate_of_penetration", "impact_velocity", "blow_period")
 
 
 def means(scene):
     """The numbers of `MEANS`, by the package."""
-    found = settled(scene)
-    return [found.rate_of_penetration, found.summary()["impact_velocity"]]
+    found = settled(scene, error_estimate=True).summary()
+    names = ("rate_of_penetration", "impact_velocity", "transfer_efficiency")
+    return [found[name] for name in (*names, *(f"{one}_error" for one in ERRORS_OF))]
 
 
 CHANGED = {
@@ -190,10 +197,19 @@ CHANGED = {
 }
 
 
-@pytest.mark.parametrize("name", ["t38_rods", "rigid", "dth4_kuru"])
+OWN = {
+    "t38_rods": Scene.from_toml("t38_rods"),
+    "rigid": Scene.from_toml("rigid"),
+    "dth4_kuru": Scene.from_toml("dth4_kuru"),
+    "air": with_chambers("dth3", 1.8e6),
+    "rigid on air": with_chambers("dth3", 1.8e6).computed_by("rigid"),
+}
+
+
+@pytest.mark.parametrize("name", OWN)
 def test_a_scene_of_the_user_is_begun_with_shared_and_written(name, built, tmp_path):
-    """All of it: a top hammer with rods, rigid bodies, and a bit that breaks rock."""
-    scene = Scene.from_toml(name)
+    """All of it, with errors: rods, rigid bodies, a bit that breaks rock, and hammers on air."""
+    scene = OWN[name]
     file = tmp_path / "own.html"
     file.write_text(with_scene(built.read_text("utf-8"), scene), encoding="utf-8")
     changes = CHANGED if name == "dth4_kuru" else {"feed.force": "3500.0"}
@@ -210,7 +226,7 @@ def test_a_scene_of_the_user_is_begun_with_shared_and_written(name, built, tmp_p
         return before, await one.ask(MEANS), forms
 
     before, after, (toml, link) = opened(file, tmp_path, use)
-    assert before == pytest.approx(means(scene), rel=1e-9)
+    assert before == pytest.approx(means(scene), rel=1e-7)
     changed = scene.replace(
         **{key: {"false": False}.get(value, value) for key, value in changes.items()
            if key != "feed.force"},
@@ -218,7 +234,7 @@ def test_a_scene_of_the_user_is_begun_with_shared_and_written(name, built, tmp_p
     )  # fmt: skip
     (tmp_path / "scene.toml").write_text(toml, encoding="utf-8")
     assert Scene.from_toml(tmp_path / "scene.toml") == changed
-    assert after == pytest.approx(means(changed), rel=1e-9)
+    assert after == pytest.approx(means(changed), rel=1e-7)
     assert all(f"{key}=" in link for key in changes)
 
 
@@ -349,6 +365,32 @@ def test_keys_alone_choose_move_and_play(built, tmp_path):
     assert name == "dth4 chambers"
     assert after > before
     assert then != first
+
+
+NAMED = {"button", "radio", "slider", "textbox", "combobox", "checkbox", "image", "group", "region"}
+
+
+def test_all_parts_have_a_role_and_a_name(built, tmp_path):
+    """As those hear them who do not see: each part to act on, each picture, and what changes."""
+
+    async def use(one):
+        await one.until(f"{WITH_ERRORS} && explorer.state.blow")
+        await one.call("Accessibility.enable")
+        return (await one.call("Accessibility.getFullAXTree"))["nodes"]
+
+    found = [
+        (one["role"]["value"], one.get("name", {}).get("value", ""), one.get("properties", []))
+        for one in opened(built, tmp_path, use)
+        if not one["ignored"]
+    ]
+    assert [role for role, name, _ in found if role in NAMED and not name] == []
+    assert {"slider", "radio", "button", "image", "heading", "status", "main"} <= {
+        role for role, *_ in found
+    }
+    live = [one for *_, properties in found for one in properties if one["name"] == "live"]
+    assert {one["value"]["value"] for one in live} >= {"polite"}
+    (drawing,) = (name for role, name, _ in found if name.startswith("Piston, bit and rock"))
+    assert "MPa" in drawing
 
 
 def test_many_random_settings_leave_the_worker_alive(built, tmp_path):

@@ -13,6 +13,7 @@ import { Scene } from "./scene.js";
 import { LENGTHS, OTHERS, SLIDERS, WORDS, fill } from "./words.js";
 
 const part = id => document.getElementById(id);
+const STAGE = location.search === "?stage";
 const START = { hammer: "dth4", bit: "dth-115", rock: "kuru-granite" };
 // A slower advance is rounding [m/s].
 const LEAST_RATE = 1e-12;
@@ -260,7 +261,7 @@ function drawBlow(keep) {
   const { time, columns, greatest } = state.blow, first = !state.drawn;
   player.take(range(), keep && !first, time[columns.bit_force.indexOf(greatest.bit_force)]);
   state.drawn = true;
-  if (first && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.playOnce();
+  if (first && !matchMedia("(prefers-reduced-motion: reduce)").matches) { if (STAGE) player.play(true); else player.playOnce(); }
   part("which").textContent = fill(WORDS.which, { n: state.blow.number, at: state.blow.at.toPrecision(4) });
   figures.describe();
 }
@@ -385,6 +386,8 @@ function start(hash) {
   ask();
 }
 
+// Within another page: the drill at work alone.
+document.body.classList.toggle("stage-only", STAGE);
 part("more").open = matchMedia("(min-width: 700px) and (max-width: 1149px)").matches;
 setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
 figures = new Figures(t => { player.play(false); player.go(t); }, (key, x) => {
