@@ -224,7 +224,7 @@ def wheels(extra: list[str]) -> int:
 
 def page(extra: list[str]) -> int:
     """Make the page that runs the hammer, and test it in a browser, with its long tests."""
-    make = [
+    make: list[str | Path] = [
         tool("python"),
         "-c",
         "from percussion_model.interface.explore.build import page_file; print(page_file())",

@@ -1,6 +1,6 @@
 """A headless Chromium that opens pages and tells what they did: errors, requests, a picture.
 
-It is driven through the DevTools protocol; tornado, which carries it, comes with bokeh.
+It is driven through the DevTools protocol, which tornado carries.
 """
 
 from __future__ import annotations

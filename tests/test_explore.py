@@ -23,7 +23,7 @@ from percussion_model.simulation.driller_numbers import driller_text
 from percussion_model.simulation.uncertain import mean_text
 from tests.browser import browser, find_browser, tab
 
-pytest.importorskip("tornado", reason="a browser is driven through tornado, which comes with bokeh")
+pytest.importorskip("tornado", reason="a browser is driven through tornado")
 pytestmark = pytest.mark.skipif(
     find_browser() is None, reason="no Chromium is installed to open pages with"
 )

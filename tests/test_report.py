@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-import sys
 from html.parser import HTMLParser
 
 import pytest
 
-from percussion_model.interface import report
 from percussion_model.interface.report import HEADLINES, headline_rows, ledger_rows, write_report
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import simulate
@@ -61,12 +59,6 @@ def test_page_needs_nothing_else(case):
     assert "link" not in outline.tags
     assert all(target.startswith(("#", "data:image/png;base64,")) for target in outline.targets)
     assert ("blow-data" in outline.ids) == (case[0] != "drop")  # no piston, no blow
-
-
-def test_what_is_missing_for_zoom_is_said(monkeypatch):
-    assert report.why_not_interactive() == ""
-    monkeypatch.setitem(sys.modules, "percussion_model.interface.plotting.interactive", None)
-    assert 'pip install "percussion_model[report]"' in report.why_not_interactive()
 
 
 def test_parts_of_drawings_are_told_apart(case):

@@ -18,6 +18,7 @@ from percussion_model.analysis.study import Study, grid, table
 from percussion_model.analysis.study.response import KINDS, ROW
 from percussion_model.coupling.verdict import _jump
 from percussion_model.interface.commands.effects import table_of
+from percussion_model.interface.explore import study as report_study
 from percussion_model.interface.plotting.compared_blows import draw_comparison
 from percussion_model.interface.plotting.effect_bars import draw_effects
 from percussion_model.interface.plotting.overview import draw_overview
@@ -466,44 +467,15 @@ def test_a_study_without_loss_tells_no_rate():
     assert "Lowest rate" not in lines
 
 
-def test_a_map_does_not_colour_what_it_does_not_know():
-    pytest.importorskip("bokeh", reason="maps need bokeh")
-    from bokeh.models import ColumnDataSource, HoverTool, Legend
-
-    from percussion_model.interface.plotting.interactive_study import interactive_study
-
+def test_a_report_carries_what_it_must_not_colour():
     points = grid({"feed.force": [1e2, 1e3, 2e3], "drive.reversal_distance": [0.01, 0.02]})
     blind = np.array([True, False, False, False, False, True])
-    drawn = interactive_study(made_study(points, blind))["map"]
-    (cells,) = [one for one in drawn.select({"type": ColumnDataSource}) if one.name == "cells"]
-    at = cells.data["offset"]
-    assert np.isnan(cells.data["value"]).tolist() == blind[at].tolist()
-    assert cells.data["grey"].tolist() == blind[at].tolist()
-    assert [bool(word) for word in cells.data["verdict"]] == blind[at].tolist()
-    (legend,) = drawn.select({"type": Legend})
-    assert legend.visible
-    assert "undecided" in legend.items[0].label.value
-    texts = zip(cells.data["rate_text"], blind[at], strict=True)
-    known = [text for text, grey in texts if not grey]
-    assert known
+    carried = report_study.data(made_study(points, blind))
+    assert carried["undecided"] == blind.astype(int).tolist()
+    assert "rate" in carried["hideable"]
+    known = [text for text, grey in zip(carried["rates"], blind, strict=True) if not grey]
     assert all("±" in text for text in known)
-    assert any("@rate_text" in str(tool.tooltips) for tool in drawn.select({"type": HoverTool}))
-    sure = interactive_study(made_study(points, np.zeros(6, bool)))["map"]
-    assert not any(one.visible for one in sure.select({"type": Legend}))
-
-
-def test_samples_have_error_bars():
-    pytest.importorskip("bokeh", reason="scatter needs bokeh")
-    from bokeh.models import Whisker
-
-    from percussion_model.interface.plotting.interactive_study import interactive_study
-
-    found = made_study(table({"feed.force": [1e2, 1e3, 2e3]}), np.array([True, False, False]))
-    (bars,) = interactive_study(found)["scatter"].select({"type": Whisker})
-    data = bars.source.data
-    width = 0.5 * (data["upper"] - data["lower"])
-    assert width == pytest.approx(1e3 * found.rows["rate_of_penetration_error"], rel=1e-5)
-    assert data["colour"][0] not in data["colour"][1:]
+    assert report_study.data(made_study(points, np.zeros(6, bool)))["undecided"] == [0] * 6
 
 
 def test_error_bars_of_figure_9_stay_in_the_panel():

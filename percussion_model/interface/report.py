@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable, Sequence
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ from markupsafe import Markup
 from percussion_model.analysis.drill_string import Extreme
 from percussion_model.analysis.study import KNOWN_ERRORS, Study
 from percussion_model.components import COMPONENTS
-from percussion_model.interface.explore import blow
+from percussion_model.interface.explore import blow, study
 from percussion_model.interface.pages import filled
 from percussion_model.interface.plotting import CAPTIONS, figures, watched_string
 from percussion_model.interface.plotting.window import (
@@ -164,7 +163,7 @@ STUDY_CAPTIONS = {
     "scatter": (
         "All points over each parameter. Blue is periodic, orange aperiodic, with bars of the "
         "error of the rate; grey is undecided, as in maps. Points "
-        "that are chosen with a box or lasso in one panel stand out in all."
+        "that are chosen with a box in one panel stand out in all."
     ),
     "points": (
         "All points and what was found there; a click on a heading sorts. The errors of the rate "
@@ -173,10 +172,13 @@ STUDY_CAPTIONS = {
 }
 # How to look closer at figures.
 DRAWN = "Drag a box to look closer, double-click to see all again."
-OF_BOKEH = "Drag a box to zoom, double-click to go back; further tools appear beside each figure."
+OF_STUDY = (
+    "Drag a box to look closer, of samples to choose points (with Shift: to look closer); "
+    "double-click to see all again. The pointer tells of a point."
+)
 # So many failed points are listed.
 MOST_FAILURES = 10
-PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib", "bokeh")
+PACKAGES = ("percussion_model", "numpy", "numba", "scipy", "matplotlib")
 
 
 class FigureBlock(NamedTuple):
@@ -184,19 +186,6 @@ class FigureBlock(NamedTuple):
 
     html: Markup
     caption: str
-
-
-def why_not_interactive() -> str:
-    """Return why figures of a page cannot be zoomed, nothing if they can."""
-    try:
-        import_module("percussion_model.interface.plotting.interactive")
-    except ImportError as error:
-        name = error.name or str(error)
-        return (
-            f"figures cannot be zoomed, since {name} is missing: "
-            'pip install "percussion_model[report]"'
-        )
-    return ""
 
 
 def write_report(
@@ -240,7 +229,7 @@ def render_report(result: Result, drawings: Sequence[Path], rock_interval: str =
     ----------
     result : Result
     drawings : sequence of Path
-        SVG files, for figures that cannot be zoomed.
+        SVG files.
     rock_interval : str
     """
     blocks = {path.stem: _inline_svg(path, CAPTIONS[path.stem]) for path in drawings}
@@ -264,7 +253,6 @@ def render_report(result: Result, drawings: Sequence[Path], rock_interval: str =
         figures=[FigureBlock(blocks[name], text) for name, text in CAPTIONS.items()
                  if name in blocks],
         zoomable=DRAWN,
-        remark="",
         scripts=blow.script(),
         blow=blow.data(shown[0]) if shown and result.scene.piston.model != "absent" else "",
         places=blow.places(),
@@ -379,8 +367,6 @@ def _computing_rows(result: Result) -> list[tuple[str, str]]:
 def write_study_report(found: Study, folder: str | Path) -> Path:
     """Write `report.html`, which needs no other file and no network.
 
-    Without bokeh it has no figures, and says so.
-
     Parameters
     ----------
     found : Study
@@ -397,14 +383,9 @@ def write_study_report(found: Study, folder: str | Path) -> Path:
 
 def render_study_report(found: Study) -> str:
     """Return the page as text."""
-    remark, scripts = why_not_interactive(), ""
-    blocks: list[FigureBlock] = []
-    if not remark:
-        from percussion_model.interface.plotting.interactive import embedded
-        from percussion_model.interface.plotting.interactive_study import interactive_study
-
-        places, scripts = embedded(interactive_study(found))
-        blocks = [FigureBlock(Markup(one), STUDY_CAPTIONS[name]) for name, one in places.items()]
+    blocks = [
+        FigureBlock(place, STUDY_CAPTIONS[name]) for name, place in study.places(found).items()
+    ]
     points = found.points
     failed = [k for k, text in enumerate(found.failures) if text]
     return _render(
@@ -419,10 +400,9 @@ def render_study_report(found: Study) -> str:
         ],
         failed=len(failed),
         figures=blocks,
-        zoomable=OF_BOKEH if blocks else "",
-        style="",
-        remark=remark,
-        scripts=Markup(scripts),
+        zoomable=OF_STUDY,
+        style=blow.style(),
+        scripts=study.script(found),
     )  # fmt: skip
 
 

@@ -163,10 +163,8 @@ def _tell_of_cost(
 def _report(found: Study, folder: Path) -> list[Path]:
     """Write the report; the results are safe already."""
     try:
-        from percussion_model.interface.report import why_not_interactive, write_study_report
+        from percussion_model.interface.report import write_study_report
     except ImportError as error:
         common.print_message(common.needs_plot_extra(error))
         return []
-    if remark := why_not_interactive():
-        common.print_message(remark)
     return [write_study_report(found, folder)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from percussion_model.analysis.drill_string import cells_of
-from percussion_model.interface.explore.build import REFERENCE_HOLE, as_json, joined, source
+from percussion_model.interface.explore.build import REFERENCE_HOLE, as_json, joined, packed, source
 from percussion_model.interface.plotting.window import TRANSITS_SHOWN, Window
 from percussion_model.scene.bits import bit, bit_of
 from percussion_model.simulation.simulate import Simulation
@@ -57,9 +56,9 @@ def data(window: Window) -> Markup:
     scene, time, own = window.scene, window.time, bit_of(window.scene)
     busy = min(WAVES * max(bar.transit_time for bar in scene.bars.values()), window.length)
     blow = {
-        "time": _packed(time[_near(time, busy, BUSY)]),
+        "time": packed(time[_near(time, busy, BUSY)]),
         "columns": {
-            name: _packed(window.samples[name][_near(time, busy, BUSY)]) for name in COLUMNS
+            name: packed(window.samples[name][_near(time, busy, BUSY)]) for name in COLUMNS
         },
         "fields": _fields(window, time[_near(time, busy, STRESSES)]),
         "period": window.length,
@@ -102,16 +101,11 @@ def _fields(window: Window, times: np.ndarray) -> list[dict[str, Any]]:
         found.append(
             {
                 "bar": number,
-                "edges": _packed(edges),
-                "time": _packed(times),
-                "kinetic": _packed(0.5 * np.sum(grid.mass * speed * speed, axis=1)),
+                "edges": packed(edges),
+                "time": packed(times),
+                "kinetic": packed(0.5 * np.sum(grid.mass * speed * speed, axis=1)),
                 "scale": scale,
-                "stress": _packed(np.round(stress / scale), "<i2"),
+                "stress": packed(np.round(stress / scale), "<i2"),
             }
         )
     return found
-
-
-def _packed(values: np.ndarray, kind: str = "<f4") -> str:
-    """Numbers as precise as an eye can tell, in letters."""
-    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()

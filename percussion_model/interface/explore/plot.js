@@ -1,5 +1,4 @@
 // A plot on a canvas: axes and curves drawn once, a cursor over them in each frame.
-import { short } from "./numbers.js";
 
 export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -15,12 +14,34 @@ export function ticks(one, other, count) {
   return found;
 }
 
+// A number beside an axis: short, whatever its size.
+export function tickText(value) {
+  const near = Number(value.toPrecision(6)), size = Math.abs(near);
+  return near === 0 || (size >= 1e-3 && size < 1e5) ? String(near) : near.toExponential().replace("e+", "e");
+}
+
+// Round numbers between two ends on a logarithmic scale.
+function decades(low, high) {
+  const first = Math.floor(Math.log10(low)), count = Math.ceil(Math.log10(high)) - first;
+  const all = Array.from({ length: count }, (_, n) => [1, 2, 5].map(m => m * 10 ** (first + n))).flat();
+  return all.filter(one => one >= low && one <= high);
+}
+
 // A canvas as large as it is shown, in pixels of the screen.
 export function fitted(canvas) {
   const scale = Math.min(window.devicePixelRatio || 1, 3), box = canvas.getBoundingClientRect();
   const width = Math.max(Math.round(box.width * scale), 10), height = Math.max(Math.round(box.height * scale), 10);
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   return { width: width / scale, height: height / scale, scale };
+}
+
+function shareOf(value, [low, high], log) {
+  return log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+}
+
+function valueAt(share, [low, high], log) {
+  const part = Math.min(Math.max(share, 0), 1);
+  return log ? low * (high / low) ** part : low + part * (high - low);
 }
 
 export class Plot {
@@ -37,35 +58,33 @@ export class Plot {
     canvas.addEventListener("pointermove", event => { if (event.buttons) at(event); });
   }
 
-  xOf(pixel) {
-    const share = (pixel - this.left) / (this.right - this.left);
-    return this.x[0] + Math.min(Math.max(share, 0), 1) * (this.x[1] - this.x[0]);
-  }
-  px(x) { return this.left + (x - this.x[0]) / (this.x[1] - this.x[0]) * (this.right - this.left); }
-  py(y) { return this.bottom - (y - this.y[0]) / (this.y[1] - this.y[0]) * (this.bottom - this.top); }
+  xOf(pixel) { return valueAt((pixel - this.left) / (this.right - this.left), this.x, this.logs[0]); }
+  yOf(pixel) { return valueAt((this.bottom - pixel) / (this.bottom - this.top), this.y, this.logs[1]); }
+  px(x) { return this.left + shareOf(x, this.x, this.logs[0]) * (this.right - this.left); }
+  py(y) { return this.bottom - shareOf(y, this.y, this.logs[1]) * (this.bottom - this.top); }
 
-  // Begin anew: axes from x[0] to x[1] and y[0] to y[1], with names.
-  begin(x, y, xName, yName) {
+  // Begin anew: axes from x[0] to x[1] and y[0] to y[1], with names; logs: which are logarithmic.
+  begin(x, y, xName, yName, logs = [false, false]) {
     const size = fitted(this.canvas), font = parseFloat(getComputedStyle(document.documentElement).fontSize) * 0.78;
     Object.assign(this.still, { width: this.canvas.width, height: this.canvas.height });
     const pen = this.pen = this.still.getContext("2d");
     pen.setTransform(size.scale, 0, 0, size.scale, 0, 0);
     pen.font = `${font}px system-ui, "DejaVu Sans", sans-serif`;
-    Object.assign(this, { x, y, left: 3.6 * font, right: size.width - 0.9 * font, top: 1.7 * font, bottom: size.height - 2.7 * font, scale: size.scale, font, drawn: true });
+    Object.assign(this, { x, y, logs, left: 3.6 * font, right: size.width - 0.9 * font, top: 1.7 * font, bottom: size.height - 2.7 * font, scale: size.scale, font, drawn: true });
     pen.fillStyle = colour("soft");
     pen.strokeStyle = colour("grid");
     pen.lineWidth = 1;
     pen.textAlign = "center";
     pen.textBaseline = "top";
-    for (const t of ticks(...x, (this.right - this.left) / (5.5 * font))) {
+    for (const t of logs[0] ? decades(...x) : ticks(...x, (this.right - this.left) / (5.5 * font))) {
       this.line([[t, y[0]], [t, y[1]]], "grid", 1);
-      pen.fillText(short(t), this.px(t), this.bottom + 0.3 * font);
+      pen.fillText(tickText(t), this.px(t), this.bottom + 0.3 * font);
     }
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    for (const t of ticks(...y, (this.bottom - this.top) / (2.6 * font))) {
+    for (const t of logs[1] ? decades(...y) : ticks(...y, (this.bottom - this.top) / (2.6 * font))) {
       this.line([[x[0], t], [x[1], t]], "grid", 1);
-      if (this.py(t) > this.top + 0.5 * font) pen.fillText(short(t), this.left - 0.4 * font, this.py(t)); // the name is there
+      if (this.py(t) > this.top + 0.5 * font) pen.fillText(tickText(t), this.left - 0.4 * font, this.py(t)); // the name is there
     }
     pen.textBaseline = "alphabetic";
     pen.fillText(xName, this.right, this.bottom + 2.4 * font);
@@ -82,7 +101,7 @@ export class Plot {
     pen.clip();
     pen.beginPath();
     for (const [x, y] of points) pen.lineTo(this.px(x), this.py(y));
-    Object.assign(pen, { strokeStyle: colour(name), lineWidth: width, lineJoin: "round" });
+    Object.assign(pen, { strokeStyle: colour(name) || name, lineWidth: width, lineJoin: "round" });
     pen.setLineDash(dash);
     pen.stroke();
     pen.restore();
