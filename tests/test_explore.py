@@ -19,6 +19,7 @@ from percussion_model.scene.hammers import hammer, with_chambers
 from percussion_model.scene.rocks import rock, rocks
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.typical import hint_of
 from percussion_model.simulation.driller_numbers import driller_text
 from percussion_model.simulation.uncertain import mean_text
 from tests.browser import browser, find_browser, tab
@@ -335,6 +336,29 @@ def test_bad_values_answer_in_place_in_the_words_of_the_package(built, tmp_path)
     assert word == 'feed.force = "ab": must be a number from -1e9 to 1e9 N'
     assert fine == ""
     assert refused.startswith("rotation.string_stiffness = 5.0 N m/rad needs rotation.inertia")
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"feed.force": 2000.0},
+        {"effects.breaking": False, "rock.loading_stiffness": 2e7, "feed.force": 1e6},
+    ],
+)
+def test_doubts_are_told_in_the_words_of_the_package(values, built, tmp_path):
+    """A casing that lifts off; rock that is pressed in too deep, by a feed that no drill has."""
+    scene = hammer("dth4").replace(**values)
+    link = "&".join(f"{key}={str(value).lower()}" for key, value in values.items())
+
+    async def use(one):
+        await one.until(WITH_ERRORS)
+        return await one.ask("[...document.querySelectorAll('#notes p')].map(o => o.textContent)")
+
+    told = opened(built, tmp_path, use, f"#hammer=dth4&{link}")
+    hints = [hint for key in values if (hint := hint_of(key, [values[key]]))]
+    warned = settled(scene, error_estimate=True).warnings
+    assert len(told) == len(values)
+    assert set(told) <= {*hints, *warned}
 
 
 def test_keys_alone_choose_move_and_play(built, tmp_path):

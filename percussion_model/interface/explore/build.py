@@ -35,9 +35,11 @@ from percussion_model.engine.web_table import PRESSURES, scene_as_json, table
 from percussion_model.interface.plotting.window import TRANSITS_SHOWN
 from percussion_model.scene.bits import bit, bits
 from percussion_model.scene.hammers import AIR, CHAMBERS, hammer, hammers, with_chambers
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.scene.rocks import rock, rocks
 from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.scene import Scene
+from percussion_model.scene.typical import FAR, hint_of
 from percussion_model.scene.writing import write_whole
 from percussion_model.simulation import validity
 from percussion_model.simulation.error_estimate import FLOOR_SHARE
@@ -60,6 +62,7 @@ LEAST_HOLE, MOST_HOLE, REFERENCE_HOLE = 0.85, 1.35, 0.0826
 IMPORT = re.compile(r'^import \{(.*?)\} from "[./\w]*?(\w+)\.js";\n', re.M | re.S)
 # Where the page holds a scene to begin with, and how one without a title is called.
 OWN, OWN_TITLE = '<script id="own" type="text/plain"></script>', "Your own scene"
+HUGE = 1e300  # is usual for nothing
 # Most numbers of rock and bit that are known by intervals.
 MOST_UNCERTAIN = 8
 
@@ -236,6 +239,15 @@ def _notes() -> dict[str, Any]:
             "held": validity.HELD,
         },
         "throttled": THROTTLED,
+        "usual": {
+            row.key: {
+                "low": row.typical[0] / FAR,
+                "high": row.typical[1] * FAR,
+                "text": hint_of(row.key, [Fact(0, HUGE)]),
+            }
+            for row in parameter_table()
+            if row.typical and "*" not in row.key
+        },
     }
 
 

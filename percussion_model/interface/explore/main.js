@@ -5,7 +5,7 @@ import { Figures, prepared, stretch } from "./figures.js";
 import { Inputs, bitTitle, shorter } from "./inputs.js";
 import { short, unitOf } from "./numbers.js";
 import { Judge, RATE } from "./judge.js";
-import { notesOf } from "./notes.js";
+import { notesOf, unusual } from "./notes.js";
 import { Overtaken, Pool } from "./pool.js";
 import { Player } from "./player.js";
 import { numberTexts, rateText, showResult } from "./result.js";
@@ -134,7 +134,7 @@ async function answer(id, scene) {
   if (hasRate && plan === undefined) compare(found.grid);
   pool.ends(found.end);
   const errors = hasRate ? judge.gridErrors(whole, found, plan, coarse, changes => job("run", { ...changed(changes), end: found.end })) : {};
-  if (found.kind !== "stalled") state.found.notes = notesOf(scene, state.found, rest.last, tables.notes);
+  if (found.kind !== "stalled") state.found.notes.push(...notesOf(scene, state.found, rest.last, tables.notes));
   const told = [Promise.resolve(errors).then(grid => {
     if (id !== state.asked) return;
     state.found.errors = hasRate ? addVolume(judge.errors(found, state.found.counted, grid)) : {};
@@ -157,7 +157,7 @@ function showRate(id, found) {
   state.found = {
     ...found, rate: Math.abs(rate) < LEAST_RATE ? 0 : rate, counted, means: addVolume(values), rock: scene.get("effects.rock"), stiffness: scene.get("rock.loading_stiffness") * scene.get("rock.buttons"),
     undamped: !scene.get("effects.loss") || scene.get("loss.time") === 0,
-    notes: [], interval: waits ? fill(WORDS.rockWaiting, { done: 0, count: waits.samples.length }) : scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing,
+    notes: unusual(scene, tables.notes), interval: waits ? fill(WORDS.rockWaiting, { done: 0, count: waits.samples.length }) : scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing,
   };
   Object.assign(state, { shown: id, took: performance.now() - state.began });
   drawCurves();

@@ -27,6 +27,14 @@ export function notesOf(scene, found, last, { texts, limits, throttled }) {
   return told;
 }
 
+// Values far from what is usual.
+export function unusual(scene, { usual }) {
+  return Object.entries(usual).flatMap(([key, { low, high, text }]) => {
+    const value = scene.matters(key) ? scene.get(key) : 0, size = Math.abs(value);
+    return value && (size < low || size > high) ? [filled(text, [value])] : [];
+  });
+}
+
 function filled(text, facts) {
   return text.replace(/\{(\d)(?::([^{}]*))?\}/g, (_, k, form) => written(facts[k], form ?? ""));
 }
