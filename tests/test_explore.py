@@ -269,9 +269,11 @@ def test_links_of_strangers_are_checked(built, tmp_path):
     async def use(one):
         said = []
         for link in links.values():
-            await one.ask(f"location.hash = '{link}'; new Promise(done => setTimeout(done, 20))")
+            await one.ask(
+                f"document.getElementById('said').textContent = ''; location.hash = '{link}'"
+            )
+            said.append(await one.until("document.getElementById('said').textContent"))
             await one.until(SHOWN)
-            said.append(await one.ask("document.getElementById('said').textContent"))
         return said
 
     for why, text in zip(WRONG, opened(built, tmp_path, use), strict=True):

@@ -41,7 +41,7 @@ export class Engine {
     this.free = plain(code.native_free, ":w");
     this._check = plain(code.scene_check_base, "w:ww");
     this._solver = plain(code.scene_solver_base, "w:w");
-    this._judge = Object.fromEntries(Object.entries(table.judgement).map(([name, form]) =>
+    this.judge = Object.fromEntries(Object.entries(table.judgement).map(([name, form]) =>
       [name, plain(code[`judge_${name}_base`], form)]));
     this.entries = {};
     for (const solver of table.solvers) {
@@ -127,14 +127,14 @@ export class Engine {
 
   // Name of the solver of a scene: "modal", "wave", "rigid"; "" for one that is not here.
   solver(scene) {
-    return this._withImage(scene, (image) => this._kind(this._solver(image)));
+    return this.withImage(scene, (image) => this._kind(this._solver(image)));
   }
 
   // Why a scene cannot be computed, in the words of the package; "" if it can.
   refuse(scene) {
     const found = this._outOfBounds(scene);
     if (found.length) return found.join("\n");
-    return this._withImage(scene, (image, facts) => {
+    return this.withImage(scene, (image, facts) => {
       let fault = this._check(image, facts);
       if (fault === 0) {
         const solver = this._kind(this._solver(image));
@@ -180,59 +180,17 @@ export class Engine {
   // two columns whose sums are divided ("one": of ones), stretches, and fewest blows.
   numbersOver(blows, wanted) {
     const words = { ...Object.fromEntries(this.table.columns.blow.map(({ name, word }) => [name, word])), one: ONES };
-    return this.withBlows([blows], ([rows]) => this._withNumbers(8, (room) =>
+    return this.withBlows([blows], ([rows]) => this.withNumbers(8, (room) =>
       Object.fromEntries(Object.entries(wanted).map(([name, [over, under, stretches, least]]) => {
         this.numbers(room, 3 + stretches.length).set(stretches, 3);
-        this._judge.number(rows, blows.length, words[over], words[under], room + 3 * WORD, stretches.length, least, room);
+        this.judge.number(rows, blows.length, words[over], words[under], room + 3 * WORD, stretches.length, least, room);
         const [value, scatter, apart] = this.numbers(room, 3);
         return [name, { value, scatter, apart }];
       }))));
   }
 
-  // Mean drilling cycles of blows.
-  cyclesOver(blows) {
-    return this.withBlows([blows], ([rows]) => this._judge.cycles(rows, blows.length));
-  }
-
-  // Barriers, by the present one, beyond which close decisions of a run fall the other way, as runs on
-  // coarser grids tell.
-  barriers(blows, others) {
-    const lists = [blows, ...others], count = lists.length;
-    return this.withBlows(lists, (addresses) => this._withNumbers(2 * count + 2, (room) => {
-      const words = this.words(room, 2 * count);
-      lists.forEach((one, k) => { words[k] = BigInt(addresses[k]); words[count + k] = BigInt(one.length); });
-      const out = room + 2 * count * WORD;
-      this._judge.barriers(room, room + count * WORD, count, out);
-      return Array.from(this.numbers(out, 2)).filter(Number.isFinite);
-    }));
-  }
-
-  // Relative error of a number. rows: [value, scatter, cycles, modes or steps] of the run, of so many
-  // others on coarser grids, and of those with another barrier.
-  errorOf(grid, rows, others, apart, promised, floorShare, numerical) {
-    return this._withNumbers(4 * rows.length, (room) => {
-      this.numbers(room, 4 * rows.length).set(rows.flat());
-      return this._judge.error(grid, room, rows.length, others, apart, promised, floorShare, numerical);
-    });
-  }
-
-  // Modes or steps of runs to compare with, of a scene that has so many at present.
-  coarser(scene, grid, present) {
-    return this._withImage(scene, (image) => this._withNumbers(present + 2, (room) =>
-      Array.from(this.words(room, this._judge.coarser(image, grid, present, room)), Number)));
-  }
-
-  // Relative error of the rate that so many modes or steps promise.
-  promised(scene, grid, present) {
-    return this._withImage(scene, (image) => this._judge.promised(image, grid, present));
-  }
-
-  longerStep(step, longest) {
-    return this._judge.longer_step(step, longest);
-  }
-
   // Give room for numbers to a function.
-  _withNumbers(count, use) {
+  withNumbers(count, use) {
     const room = this.allocate(count);
     try {
       return use(room);
@@ -246,7 +204,7 @@ export class Engine {
   }
 
   // Give an image and room for facts to a function, for as long as it runs.
-  _withImage(scene, use) {
+  withImage(scene, use) {
     const image = this.image(scene), address = this.allocate(image.length + FACTS);
     this.words(address, image.length).set(image);
     try {
@@ -517,7 +475,7 @@ export class Motion {
 
   // What it is divided by: the number of the kind of grid, and modes or steps in the first elastic bar.
   grid() {
-    const { engine: { table: { grids }, _judge: judge } } = this, [[name, bar] = []] = this._bars();
+    const { engine: { table: { grids }, judge: judge } } = this, [[name, bar] = []] = this._bars();
     if (this.solver === "modal") return [grids.modes, judge.modes(this.base, name === "piston" ? 1 : 0)];
     if (this.solver === "wave") return [grids.steps, this.entries.cells(this._image, bar, 0, 0)];
     return [grids.none, 1];
@@ -527,7 +485,7 @@ export class Motion {
   numericalShare() {
     const { bytes, energies } = this.engine.table;
     this._seen(this.time);
-    return this.engine._judge.numerical(this._reading + bytes.reading - energies * WORD, energies);
+    return this.engine.judge.numerical(this._reading + bytes.reading - energies * WORD, energies);
   }
 
   // All that moves, and its time, to go on from in another motion of the same scene.
