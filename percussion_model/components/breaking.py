@@ -59,13 +59,13 @@ def broken(par, s):
     known = max(par.breaking_buttons * par.breaking_threshold, s.breaking_taken)
     beyond = max(s.breaking_crushed + crushed_here(par, s) - known, 0.0)
     beyond -= max(s.breaking_crushed - known, 0.0)
-    return sharpness(par, s) * beyond / max(par.breaking_crushing_energy, LEAST_DIVISOR)
+    return sharpness(par, s) * beyond / max(s.breaking_crushing_energy, LEAST_DIVISOR)
 
 
 @inlined
 def gained(par, s, deeper):
     """Advance of the hole by the present loading [m], which presses the buttons in deeper."""
-    if par.breaking_crushing_energy < LEAST_ENERGY:
+    if s.breaking_crushing_energy < LEAST_ENERGY:
         return deeper
     before = s.breaking_under_way
     volume = flushed(par, before + broken(par, s)) - flushed(par, before)
@@ -76,7 +76,7 @@ def gained(par, s, deeper):
 @inlined
 def end_loading(par, s, advance):
     """Book what a loading broke, at its peak."""
-    if par.breaking_crushing_energy >= LEAST_ENERGY:
+    if s.breaking_crushing_energy >= LEAST_ENERGY:
         volume = broken(par, s)
         s.breaking_limited += max(volume - advance * par.hole_area, 0.0)
         s.breaking_under_way += volume
@@ -145,6 +145,7 @@ COMPONENT = Component(
         "blow_volume": ("m^3", "volume broken in the last blow", 0.0),
         "limited": ("m^3", "volume that flushing and the depth pressed in have cut off", 0.0),
     },
+    inputs=("crushing_energy",),
     gained=gained,
     end_loading=end_loading,
     next_blow=next_blow,

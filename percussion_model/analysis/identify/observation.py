@@ -1,0 +1,141 @@
+"""What a rig measures, from the settled response in a table and the equations of breaking.
+
+Of a blow the table has what its motion gives: the energy W that it crushes, its frequency f, the
+work A = F D of the mean force F on the rock over the depth D pressed in, F, and r F_0. The rest
+follows from equations 20g to 20i of docs/model.md, of a bit whose old craters are crushed again:
+
+    h = min((W - max(W exp(-s/lambda), N W_0)) / (q S), D),   s = r omega / f,
+    rate = h f,   T = (1 - exp(-s / (n + 1) lambda)) (A - F h) f / omega + mu r F_0,
+
+with q = e_c / eta, the crushing energy by the efficiency of the bit, and S the hole's area. So a
+rate tells q alone; the motion does not know of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+# Unknowns of the rock and the bit, by their logarithms, and the offset of the table's rate.
+UNKNOWNS = (
+    "apparent_energy", "unloading_ratio", "loading_stiffness", "renewal_length", "threshold",
+    "friction", "table_offset",
+)  # fmt: skip
+Q, GAMMA, STIFFNESS, RENEWAL, THRESHOLD, FRICTION, OFFSET = range(len(UNKNOWNS))
+# Settings of the rig [Pa, N, rad/s], and what it measures [m/s, Hz, N m].
+SETTINGS = ("pressure", "feed", "speed")
+SIGNALS = ("rate", "frequency", "torque")
+RATE, FREQUENCY, TORQUE = range(len(SIGNALS))
+# Rows of the table.
+CRUSHED, BLOWS, WORK, FORCE, RUBBING = range(5)
+# Where nothing breaks, the energy beyond the threshold counts as this share of the blow's.
+LEAST = 1e-3
+
+
+@dataclass(frozen=True)
+class Table:
+    """Polynomials of the logarithms of a blow's numbers.
+
+    Attributes
+    ----------
+    middle, half : ndarray, shape (4,)
+        Of the logarithms of pressure [Pa], feed [N], unloading ratio and stiffness [N/m] in it.
+    powers : ndarray of int, shape (terms, 4)
+        Of the scaled logarithms in each term.
+    terms : ndarray, shape (5, terms)
+        Coefficients of ln W, ln f, ln A, ln F and ln r F_0.
+    errors : ndarray, shape (3,)
+        Of the logarithms of rate, frequency and torque, by points left out of the fit.
+    area, radius : float
+        Of the hole [m^2]; mean radius of the buttons [m].
+    buttons, exponent : float
+        Of the bit; of the loading.
+    """
+
+    middle: np.ndarray
+    half: np.ndarray
+    powers: np.ndarray
+    terms: np.ndarray
+    errors: np.ndarray
+    area: float
+    radius: float
+    buttons: float
+    exponent: float
+
+    def plain(self) -> dict[str, Any]:
+        """Return plain values, which `Table.of` takes back."""
+        return {
+            key: one.tolist() if isinstance(one, np.ndarray) else one
+            for key, one in asdict(self).items()
+        }
+
+    @classmethod
+    def of(cls, values: dict[str, Any]) -> Table:
+        """Return the table of plain values."""
+        return cls(
+            **{key: np.array(one) if isinstance(one, list) else one for key, one in values.items()}
+        )
+
+    def contains(self, settings: np.ndarray) -> np.ndarray:
+        """Whether pressure and feed of settings, shape (n, 3), are in the table."""
+        off = np.abs((np.log(settings[:, :2]) - self.middle[:2]) / self.half[:2])
+        return np.all(off <= 1.0 + 1e-9, axis=1)
+
+    def rows(self, points: np.ndarray) -> np.ndarray:
+        """Logarithms of a blow's numbers.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 4)
+            Logarithms of pressure, feed, unloading ratio and stiffness.
+
+        Returns
+        -------
+        ndarray, shape (5, n)
+        """
+        return self.terms @ basis((points - self.middle) / self.half, self.powers).T
+
+    def predict(self, unknowns: np.ndarray, settings: np.ndarray) -> np.ndarray:
+        """Logarithms of what a rig measures.
+
+        Parameters
+        ----------
+        unknowns : ndarray, shape (n, 7)
+            By `UNKNOWNS`, logarithms of SI values.
+        settings : ndarray, shape (3,) or (n, 3)
+            By `SETTINGS`, SI.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            By `SIGNALS`, of SI values.
+        """
+        settings = np.broadcast_to(settings, (len(unknowns), 3))
+        points = np.empty((len(unknowns), 4))
+        points[:, :2] = np.log(settings[:, :2])
+        points[:, 2], points[:, 3] = unknowns[:, GAMMA], unknowns[:, STIFFNESS]
+        rows = self.rows(points)
+        crushed, blows, work, force, rubbing = np.exp(rows)
+        speed = settings[:, 2]
+        turns = self.radius * speed / (blows * np.exp(unknowns[:, RENEWAL]))
+        known = np.maximum(
+            crushed * np.exp(-turns), self.buttons * np.exp(unknowns[:, THRESHOLD])
+        )
+        beyond = np.maximum(crushed - known, LEAST * crushed)
+        gained = np.minimum(beyond * np.exp(-unknowns[:, Q]) / self.area, work / force)
+        fresh = 1.0 - np.exp(-turns / (self.exponent + 1.0))
+        climbing = fresh * np.maximum(work - force * gained, 0.0) * blows / speed
+        torque = climbing + rubbing * np.exp(unknowns[:, FRICTION])
+        rate = np.log(gained * blows) + unknowns[:, OFFSET]
+        return np.stack([rate, rows[BLOWS], np.log(torque)], axis=1)
+
+
+def basis(x: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """Terms of polynomials at points, shape (n, terms)."""
+    found = np.ones((len(x), len(powers)))
+    for k in range(x.shape[1]):
+        column = np.stack([x[:, k] ** p for p in range(int(powers[:, k].max()) + 1)], axis=1)
+        found *= column[:, powers[:, k]]
+    return found
