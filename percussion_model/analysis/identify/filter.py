@@ -1,17 +1,18 @@
-"""Unscented Kalman filter of rock and bit along a hole, and its test for layers.
+"""Filter of rock and bit along a hole, and its test for layers.
 
-Logarithms of the unknowns walk at random with the depth drilled; a layer is a leap of those of
-the rock. The offset of the table stays as long as the settings do and is another one elsewhere:
-what a table is off by is no noise that many samples would average out.
-
-The update is the unscented one of S. J. Julier and J. K. Uhlmann (Proc. IEEE 92 (2004) 401); it is
-written here, of numpy alone, as it runs in FMUs, where no more may be needed.
+Samples of like settings are gathered while a layer lasts: many of them tell no more than the mean
+that they come to, and the table's error there, which they share, is no noise that they would
+average out. What the means tell is one update of what was known when the layer began. It is the
+unscented update of S. J. Julier and J. K. Uhlmann (Proc. IEEE 92 (2004) 401), made again about
+what it found (A. F. Garcia-Fernandez et al., IEEE Trans. Signal Process. 63 (2015) 5561): along
+the ridges of rates that two unknowns tell together, updates sample by sample grow sure of what
+nobody told. It is written here, of numpy alone, as it runs in FMUs, where no more may be needed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,36 +20,40 @@ import numpy as np
 
 from percussion_model.analysis.identify.observation import (
     FRICTION,
-    GAMMA,
-    OFFSET,
     Q,
     RATE,
     RENEWAL,
-    SETTINGS,
     SIGNALS,
-    STIFFNESS,
     THRESHOLD,
     UNKNOWNS,
     Table,
 )
 
 COUNT = len(UNKNOWNS)
-# Random walk in a metre [1/sqrt(m)], by the logarithm.
-WALK = {Q: 0.05, GAMMA: 0.03, STIFFNESS: 0.03, RENEWAL: 0.02, THRESHOLD: 0.02, FRICTION: 0.02}
-# What a new layer may bring: share of the prior's standard deviation, by the logarithm.
-LEAP = {Q: 1.0, GAMMA: 1.0, STIFFNESS: 1.0, RENEWAL: 0.2, THRESHOLD: 0.2, FRICTION: 0.2}
-# A change of settings by this, by the logarithm, makes another offset of the table.
-ALIKE = 0.15
+# What stays in a new layer but for this share of the prior's standard deviation; the other
+# unknowns are those of any rock again, and of q no less is unknown than so (by the logarithm).
+SLOW, LEAP, LEAST_SPREAD = (RENEWAL, THRESHOLD, FRICTION), 0.35, 0.5
+# Settings within this are alike (by the logarithm): they are gathered. The table's errors go
+# together up to about the second.
+ALIKE, TOGETHER = 0.05, 0.15
+MOST_GROUPS = 8
+# Rock differs from place to place in a layer, by the logarithm of its rate; hole in which samples
+# lose 63 % of their weight [m].
+VARIES, FORGOTTEN = 0.02, 4.0
 # Errors of a sample that count; beyond, a sample weighs less, as an outlier.
 HUBER = 2.5
-# Samples over which innovations are summed up for a layer, and the sum in standard deviations:
-# once in some ten thousand samples without one.
-WINDOWS, LAYER = (4, 8, 16), 4.7
+# Samples whose mean is held against what is known, and how many standard deviations make a layer:
+# so many in thousands of samples only if there is one.
+WINDOWS, LAYER = (4, 8, 16), 5.0
 MEMORY = max(WINDOWS)
-# Samples after a layer before the next is looked for.
-PAUSE = 8
-# Spread of the sigma points, by alpha, beta and kappa of the literature.
-ALPHA, BETA = 0.7, 2.0
+# Samples behind a change of layer before the next is looked for; those that make a mean that is
+# known by itself.
+PAUSE, KNOWN = 8, 6.0
+# Sigma points, by alpha and beta of the literature, and how often an update is made again.
+ALPHA, BETA, AGAIN = 0.8, 2.0, 1
+# Columns of a group: weight, logarithms of settings; by signal weight and mean of the logarithm.
+_SETTINGS, _WEIGHTS, _MEANS = slice(1, 4), slice(4, 7), slice(7, 10)
+WIDTH = 10
 
 
 @dataclass(frozen=True)
@@ -64,40 +69,47 @@ class Noise:
         return np.array([self.rate, self.frequency, self.torque])
 
 
+@dataclass
+class Taken:
+    """A sample that was taken: what was before it, and how far it is off."""
+
+    deeper: float
+    settings: np.ndarray
+    signals: np.ndarray
+    groups: np.ndarray  # before it
+    off: float
+    variance: float  # of what it is held against
+
+
 class RockFilter:
     """What is known of rock and bit after the samples so far.
 
     Parameters
     ----------
     table : Table
-    mean, spread : ndarray, shape (7,)
+    mean, spread : ndarray, shape (6,)
         Of the prior, by `UNKNOWNS`: logarithms, and their standard deviations.
     noise : Noise
 
     Attributes
     ----------
     x, p : ndarray
-        Mean and covariance of the unknowns.
+        Mean and covariance of the unknowns' logarithms.
     layers : int
         Changes of layer that were found.
     """
 
-    STATE = ("x", "p", "last", "memory", "sums", "since", "layers", "samples")
-
     def __init__(
         self, table: Table, mean: np.ndarray, spread: np.ndarray, noise: Noise | None = None
     ) -> None:
-        self.table, self.prior, self.spread = table, np.array(mean, float), np.array(spread, float)
-        self.spread[OFFSET] = table.errors[RATE]
+        self.table, self.mean, self.spread = table, np.array(mean, float), np.array(spread, float)
+        self.spread[Q] = max(self.spread[Q], LEAST_SPREAD)
         self.noise = (noise or Noise()).values()
-        # errors of the table where no offset stands for them
-        self.floor = np.array([0.0, table.errors[1], table.errors[2]])
-        self.x, self.p = self.prior.copy(), np.diag(self.spread**2)
-        self.last: np.ndarray | None = None
-        # before each of the latest samples: depth step, settings, signals, mean and covariance
-        self.memory: list[tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
-        self.sums: list[float] = []
-        self.since, self.layers, self.samples = 0, 0, 0
+        self.x0, self.p0 = self.mean.copy(), np.diag(self.spread**2)
+        self.x, self.p = self.x0, self.p0
+        self.groups = np.empty((0, WIDTH))
+        self.memory: list[Taken] = []
+        self.since, self.layers = 0, 0
 
     def sample(self, deeper: float, settings: np.ndarray, signals: np.ndarray) -> int:
         """Take a sample.
@@ -116,132 +128,176 @@ class RockFilter:
         int
             Samples ago at which a layer began that was found now; else 0.
         """
-        self.memory.append((deeper, settings, signals, self.x, self.p))
-        del self.memory[:-MEMORY]
-        self.sums.append(self._step(deeper, settings, signals))
-        del self.sums[:-MEMORY]
+        self._take(deeper, np.log(settings), np.log(signals))
         self.since += 1
-        self.samples += 1
         ago = self._layer_began()
         if ago:
             self._begin_layer(ago)
+        self.solve()
         return ago
 
-    def _step(self, deeper: float, settings: np.ndarray, signals: np.ndarray) -> float:
-        """Predict and update; the innovation of the rate in standard deviations, limited."""
-        self._predict(deeper, settings)
-        return self._update(settings, signals)
+    def _take(self, deeper: float, settings: np.ndarray, signals: np.ndarray) -> None:
+        before = self.groups.copy()
+        self.groups[:, 0] *= (fading := math.exp(-max(deeper, 0.0) / FORGOTTEN))
+        self.groups[:, _WEIGHTS] *= fading
+        which = self._group(settings)
+        row = self.groups[which]
+        expected, variance = row[_MEANS].copy(), self.noise**2 / np.maximum(row[_WEIGHTS], 1.0)
+        if row[4 + RATE] < KNOWN:
+            expected, variance = self.expect(np.exp(settings))
+        off = signals - expected
+        there = np.isfinite(off)
+        size = np.where(there, np.abs(off), 0.0) / np.sqrt(self.noise**2 + variance)
+        weights = np.where(there, HUBER / np.maximum(size, HUBER), 0.0)
+        row[0] += 1.0
+        row[_SETTINGS] += (settings - row[_SETTINGS]) / row[0]
+        row[_WEIGHTS] += weights
+        step = np.where(there, signals - row[_MEANS], 0.0)
+        row[_MEANS] += weights * step / np.maximum(row[_WEIGHTS], 1e-12)
+        most = 2.0 * HUBER * math.sqrt(self.noise[RATE] ** 2 + variance[RATE])
+        held = float(np.clip(off[RATE], -most, most)) if there[RATE] else 0.0
+        self.memory.append(Taken(deeper, settings, signals, before, held, float(variance[RATE])))
+        del self.memory[:-MEMORY]
 
-    def _predict(self, deeper: float, settings: np.ndarray) -> None:
-        self.x, self.p = self.x.copy(), self.p.copy()
-        walked = max(deeper, 0.0)
-        for k, rate in WALK.items():
-            self.p[k, k] += rate * rate * walked
-        if self.last is not None:
-            off = np.log(settings / self.last) / ALIKE
-            kept = math.exp(-0.5 * float(off @ off))
-            self.x[OFFSET] *= kept
-            self.p[OFFSET] *= kept
-            self.p[:, OFFSET] *= kept
-            self.p[OFFSET, OFFSET] += (1.0 - kept * kept) * self.spread[OFFSET] ** 2
-        self.last = settings
+    def _group(self, settings: np.ndarray) -> int:
+        """Number of the group of samples with settings like these, made if there is none."""
+        off = np.max(np.abs(self.groups[:, _SETTINGS] - settings), axis=1)
+        if len(off) and (np.min(off) < ALIKE or len(off) == MOST_GROUPS):
+            if np.min(off) < ALIKE:
+                return int(np.argmin(off))
+            self.groups = np.delete(self.groups, np.argmin(self.groups[:, 0]), axis=0)
+        new = np.zeros((1, WIDTH))
+        new[0, _SETTINGS] = settings
+        self.groups = np.concatenate([self.groups, new])
+        return len(self.groups) - 1
 
-    def _update(self, settings: np.ndarray, signals: np.ndarray) -> float:
-        there = np.flatnonzero(np.isfinite(signals))
-        if not len(there):
-            return 0.0
-        scale = ALPHA * math.sqrt(COUNT)
-        root = scale * np.linalg.cholesky(self.p)
-        points = np.concatenate([[self.x], self.x + root.T, self.x - root.T])
-        outer = 0.5 / (ALPHA * ALPHA * COUNT)
-        weights = np.full(len(points), outer)
-        weights[0] = 1.0 - 1.0 / (ALPHA * ALPHA)
-        values = self.table.predict(points, settings)[:, there]
+    def expect(self, settings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Logarithms of the signals that are expected at settings, and their variances."""
+        points, weights, _ = self._points()
+        values = self.table.predict(points, settings)
         mean = weights @ values
-        weights[0] += 1.0 - ALPHA * ALPHA + BETA
-        off, from_x = values - mean, points - self.x
-        own = (weights * off.T) @ off
-        cross = (weights * from_x.T) @ off
-        noise = np.hypot(self.noise, self.floor)[there] ** 2
-        innovation = np.log(signals[there]) - mean
-        size = innovation / np.sqrt(np.diag(own) + noise)
-        heavy = np.maximum(np.abs(size) / HUBER, 1.0)
-        gain = np.linalg.solve(own + np.diag(noise * heavy**2), cross.T).T
-        self.x = self.x + gain @ innovation
-        p = self.p - gain @ cross.T
-        self.p = 0.5 * (p + p.T)
-        return float(np.clip(size[0], -2.0 * HUBER, 2.0 * HUBER)) if there[0] == RATE else 0.0
+        off = values - mean
+        return mean, weights @ off**2 + BETA * off[0] ** 2 + self.table.errors**2
+
+    def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sigma points of what is known, weights of their mean and of covariances."""
+        root = ALPHA * math.sqrt(COUNT) * np.linalg.cholesky(self.p)
+        points = np.concatenate([[self.x], self.x + root.T, self.x - root.T])
+        weights = np.full(len(points), 0.5 / (ALPHA * ALPHA * COUNT))
+        weights[0] = 1.0 - 1.0 / (ALPHA * ALPHA)
+        wide = weights.copy()
+        wide[0] += 1.0 - ALPHA * ALPHA + BETA
+        return points, weights, wide
+
+    def solve(self) -> None:
+        """Update what was known when the layer began with the means of its groups."""
+        there = self.groups[:, _WEIGHTS] > 1e-3
+        if not there.any():
+            self.x, self.p = self.x0, self.p0
+            return
+        at = np.flatnonzero(there)
+        measured = self.groups[:, _MEANS].ravel()[at]
+        noise = self._noise_of_means()[np.ix_(at, at)]
+        many = len(self.groups)
+        settings = np.exp(self.groups[:, _SETTINGS])
+        for _ in range(AGAIN):
+            points, weights, wide = self._points()
+            count = len(points)
+            values = self.table.predict(
+                np.repeat(points, many, axis=0), np.tile(settings, (count, 1))
+            ).reshape(count, -1)[:, at]
+            mean = weights @ values
+            off, from_x = values - mean, points - self.x
+            slopes = np.linalg.solve(self.p, (wide * from_x.T) @ off).T
+            curved = (wide * off.T) @ off - slopes @ self.p @ slopes.T
+            total = slopes @ self.p0 @ slopes.T + noise + curved
+            gain = np.linalg.solve(total, slopes @ self.p0).T
+            self.x = self.x0 + gain @ (measured - mean - slopes @ (self.x0 - self.x))
+            p = self.p0 - gain @ total @ gain.T
+            self.p = 0.5 * (p + p.T)
+
+    def _noise_of_means(self) -> np.ndarray:
+        """Covariance of the groups' means, by group and signal: noise, rock, and the table."""
+        settings = self.groups[:, _SETTINGS] / TOGETHER
+        apart = settings[:, np.newaxis] - settings
+        alike = np.exp(-0.5 * np.sum(apart**2, axis=2))
+        found = np.kron(alike, np.diag(self.table.errors**2))
+        own = self.noise**2 / np.maximum(self.groups[:, _WEIGHTS], 1e-3)
+        own[:, RATE] += VARIES**2
+        return found + np.diag(own.ravel())
 
     def _layer_began(self) -> int:
-        """Samples ago at which a layer began, by the sum of innovations; 0 where none did."""
-        if self.since <= PAUSE:
-            return 0
+        """Samples ago at which a layer began, by their mean; 0 where none did."""
         most, found = LAYER, 0
-        for window in WINDOWS:
-            if len(self.sums) >= window:
-                size = abs(sum(self.sums[-window:])) / math.sqrt(window)
-                if size > most:
-                    most, found = size, window
+        if self.since > PAUSE:
+            for window in WINDOWS:
+                if len(self.memory) >= window:
+                    last = self.memory[-window:]
+                    common = sum(one.variance for one in last) / window
+                    error = math.sqrt(self.noise[RATE] ** 2 / window + common)
+                    size = abs(sum(one.off for one in last)) / window / error
+                    if size > most:
+                        most, found = size, window
         return found
 
     def _begin_layer(self, ago: int) -> None:
-        """Go back by some samples, widen what a layer may change, and take them again."""
+        """Go back by some samples, forget what a new layer may change, and take them again."""
         again = self.memory[-ago:]
-        *_, self.x, self.p = again[0]
-        self.widen()
-        self.last = again[0][1] if len(self.memory) == ago else self.memory[-ago - 1][1]
-        del self.memory[-ago:]
-        del self.sums[-ago:]
-        for deeper, settings, signals, _, _ in again:
-            self.memory.append((deeper, settings, signals, self.x, self.p))
-            self.sums.append(self._step(deeper, settings, signals))
-        # the sum of what led to this layer must not find it again
-        self.sums = [0.0] * len(self.sums)
+        self.groups = again[0].groups
+        self.solve()
+        slow = np.ix_(SLOW, SLOW)
+        kept = self.p[slow] + np.diag((LEAP * self.spread[list(SLOW)]) ** 2)
+        self.x0, self.p0 = self.mean.copy(), np.diag(self.spread**2)
+        self.x0[list(SLOW)], self.p0[slow] = self.x[list(SLOW)], kept
+        self.x, self.p = self.x0, self.p0
+        self.groups, self.memory = np.empty((0, WIDTH)), []
+        for one in again:
+            self._take(one.deeper, one.settings, one.signals)
         self.since = 0
         self.layers += 1
-
-    def widen(self) -> None:
-        """Forget what a new layer may change."""
-        self.p = self.p.copy()
-        for k, share in LEAP.items():
-            self.p[k, k] += (share * self.spread[k]) ** 2
 
     @property
     def sigma(self) -> np.ndarray:
         """Standard deviations of the logarithms."""
         return np.sqrt(np.diag(self.p))
 
-    def innovations_of(self, settings: np.ndarray) -> np.ndarray:
-        """Logarithms of the signals that are expected at settings."""
-        return self.table.predict(self.x[np.newaxis], settings)[0]
-
     def save(self) -> dict[str, Any]:
         """State as plain values."""
         return {
-            "x": self.x.tolist(), "p": self.p.ravel().tolist(),
-            "last": [] if self.last is None else self.last.tolist(),
-            "memory": [
-                float(v) for d, s, y, x, p in self.memory
-                for v in (d, *s, *np.nan_to_num(y, nan=-1.0), *x, *p.ravel())
-            ],
-            "sums": list(self.sums), "since": self.since, "layers": self.layers,
-            "samples": self.samples,
+            **{name: getattr(self, name).ravel().tolist() for name in _ARRAYS},
+            "memory": [v for one in self.memory for v in _flat(one)],
+            "since": self.since, "layers": self.layers,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to a state."""
-        self.x = np.array(saved["x"], float)
-        self.p = np.array(saved["p"], float).reshape(COUNT, COUNT)
-        self.last = np.array(saved["last"], float) if saved["last"] else None
-        self.memory = list(_rows(saved["memory"]))
-        self.sums = list(saved["sums"])
+        for name, shape in _ARRAYS.items():
+            setattr(self, name, np.array(saved[name], float).reshape(shape))
+        self.memory, flat = [], np.array(saved["memory"], float)
+        while len(flat):
+            size = int(flat[0])
+            self.memory.append(_unflat(flat[1:size]))
+            flat = flat[size:]
         self.since, self.layers = int(saved["since"]), int(saved["layers"])
-        self.samples = int(saved["samples"])
 
 
-def _rows(flat: Sequence[float]) -> Any:
-    inputs = 1 + len(SETTINGS) + len(SIGNALS)
-    for row in np.array(flat, float).reshape(-1, inputs + COUNT + COUNT * COUNT):
-        signals = np.where(row[4:inputs] < 0.0, np.nan, row[4:inputs])
-        x, p = row[inputs : inputs + COUNT], row[inputs + COUNT :].reshape(COUNT, COUNT)
-        yield float(row[0]), row[1:4], signals, x, p
+_ARRAYS = {
+    "x0": (COUNT,), "p0": (COUNT, COUNT), "x": (COUNT,), "p": (COUNT, COUNT), "groups": (-1, WIDTH),
+}  # fmt: skip
+# Plain values have no NaN: a signal that is missing, far below any logarithm.
+_MISSING = -1e9
+
+
+def _flat(one: Taken) -> list[float]:
+    signals = np.where(np.isfinite(one.signals), one.signals, _MISSING)
+    values = [one.deeper, one.off, one.variance, *one.settings, *signals, *one.groups.ravel()]
+    return [float(len(values) + 1), *map(float, values)]
+
+
+def _unflat(flat: np.ndarray) -> Taken:
+    many = 3 + 3
+    signals = flat[many : many + len(SIGNALS)]
+    return Taken(
+        float(flat[0]), flat[3:many], np.where(signals == _MISSING, np.nan, signals),
+        flat[many + len(SIGNALS) :].reshape(-1, WIDTH), float(flat[1]), float(flat[2]),
+    )  # fmt: skip

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-# Unknowns of the rock and the bit, by their logarithms, and the offset of the table's rate.
+# Unknowns of the rock and the bit, by their logarithms.
 UNKNOWNS = (
     "apparent_energy", "unloading_ratio", "loading_stiffness", "renewal_length", "threshold",
-    "friction", "table_offset",
+    "friction",
 )  # fmt: skip
-Q, GAMMA, STIFFNESS, RENEWAL, THRESHOLD, FRICTION, OFFSET = range(len(UNKNOWNS))
+Q, GAMMA, STIFFNESS, RENEWAL, THRESHOLD, FRICTION = range(len(UNKNOWNS))
 # Settings of the rig [Pa, N, rad/s], and what it measures [m/s, Hz, N m].
 SETTINGS = ("pressure", "feed", "speed")
 SIGNALS = ("rate", "frequency", "torque")
@@ -102,7 +102,7 @@ class Table:
 
         Parameters
         ----------
-        unknowns : ndarray, shape (n, 7)
+        unknowns : ndarray, shape (n, 6)
             By `UNKNOWNS`, logarithms of SI values.
         settings : ndarray, shape (3,) or (n, 3)
             By `SETTINGS`, SI.
@@ -128,8 +128,7 @@ class Table:
         fresh = 1.0 - np.exp(-turns / (self.exponent + 1.0))
         climbing = fresh * np.maximum(work - force * gained, 0.0) * blows / speed
         torque = climbing + rubbing * np.exp(unknowns[:, FRICTION])
-        rate = np.log(gained * blows) + unknowns[:, OFFSET]
-        return np.stack([rate, rows[BLOWS], np.log(torque)], axis=1)
+        return np.stack([np.log(gained * blows), rows[BLOWS], np.log(torque)], axis=1)
 
 
 def basis(x: np.ndarray, powers: np.ndarray) -> np.ndarray:

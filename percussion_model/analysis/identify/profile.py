@@ -1,0 +1,257 @@
+"""Rock along a hole: a log through the filter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from percussion_model.analysis.identify.cleaning import (
+    COLLARING,
+    Log,
+    Samples,
+    clean,
+    ranges_of,
+    without_lags,
+)
+from percussion_model.analysis.identify.filter import Noise, RockFilter
+from percussion_model.analysis.identify.observation import (
+    GAMMA,
+    Q,
+    RATE,
+    SIGNALS,
+    STIFFNESS,
+    UNKNOWNS,
+    Table,
+)
+from percussion_model.analysis.identify.prior import WITHIN, Prior, prior_of
+from percussion_model.analysis.identify.tabulate import REACH, Drive, IdentifyError, tabulate
+from percussion_model.scene.rocks.breaking import (
+    EFFICIENCY,
+    ENERGY_SHARES,
+    energy_by_strength,
+)
+from percussion_model.scene.scene import Scene
+
+# Standard deviations of an interval of 95 %.
+SURE = 1.96
+# The data tell what they narrow to less than this share of its prior.
+TOLD = 0.5
+# Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
+LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
+# Mean absolute deviation of a normal variable, by its standard deviation.
+MAD = 0.6745
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a log tells of the rock.
+
+    Attributes
+    ----------
+    depth : ndarray, shape (n,)
+        Of the samples [m].
+    mean, spread : ndarray, shape (n, 6)
+        Logarithms of `UNKNOWNS` after each sample, and their standard deviations.
+    layers : list of float
+        Depths at which a layer was found to begin [m].
+    samples : Samples
+    table : Table
+    prior : Prior
+    noise : Noise
+    worn : ndarray, shape (n,)
+        Efficiency of the bit by that of a sharp one, as the scene has it.
+    covariance : ndarray, shape (6, 6)
+        Of the logarithms behind the last sample.
+    """
+
+    depth: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+    layers: list[float]
+    samples: Samples
+    table: Table
+    prior: Prior
+    noise: Noise
+    worn: np.ndarray
+    covariance: np.ndarray
+    notes: list[str] = field(default_factory=list)
+
+    def interval(self, which: int = Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Low end, value and high end of an unknown, of 95 %, SI."""
+        off = SURE * self.spread[:, which]
+        return tuple(np.exp(self.mean[:, which] + k * off) for k in (-1.0, 0.0, 1.0))  # type: ignore[return-value]
+
+    def strength(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compressive strength by the library's relation: low end, value and high end [Pa].
+
+        The crushing energy is the quantity told times the efficiency of the bit; the interval has
+        that of the efficiency and that of the relation as well.
+        """
+        eta = math.sqrt(EFFICIENCY.low * EFFICIENCY.high) * self.worn
+        sigma = math.hypot(
+            math.log(EFFICIENCY.high / EFFICIENCY.low) / WITHIN,
+            math.log(ENERGY_SHARES[1] / ENERGY_SHARES[0]) / WITHIN,
+        )
+        off = SURE * np.hypot(self.spread[:, Q], sigma)
+        energy = self.mean[:, Q] + np.log(eta)
+        return tuple(strength_by_energy(np.exp(energy + k * off)) for k in (-1.0, 0.0, 1.0))  # type: ignore[return-value]
+
+    def told(self) -> dict[str, bool]:
+        """Whether the log tells an unknown, or it is held with its prior."""
+        narrow = self.spread[-1] < TOLD * self.prior.spread
+        return {name: bool(narrow[k]) for k, name in enumerate(UNKNOWNS)}
+
+    def every(self, step: float) -> np.ndarray:
+        """Samples at which rows are written: the last one in each step of depth [m]."""
+        cell = np.floor(self.depth / step)
+        return np.flatnonzero(np.append(np.diff(cell) > 0.0, True))
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers as plain values."""
+        low, value, high = self.interval()
+        ends = [float(self.depth[0]), *self.layers, float(self.depth[-1])]
+        found = []
+        for top, bottom in zip(ends[:-1], ends[1:], strict=True):
+            k = max(int(np.searchsorted(self.depth, bottom)) - 1, 0)
+            strength = [float(one[k]) for one in self.strength()]
+            found.append(
+                {"top": top, "bottom": bottom, "apparent_energy": float(value[k]),
+                 "low": float(low[k]), "high": float(high[k]), "strength": strength[1],
+                 "strength_low": strength[0], "strength_high": strength[2]}
+            )  # fmt: skip
+        return {
+            "layers": found, "told": self.told(), "rows": self.samples.total,
+            "samples": len(self.depth), "dropped": self.samples.dropped,
+            "noise": dict(zip(SIGNALS, self.noise.values().tolist(), strict=True)),
+            "table_errors": dict(zip(SIGNALS, self.table.errors.tolist(), strict=True)),
+            "notes": [*self.samples.notes, *self.notes],
+        }  # fmt: skip
+
+
+def strength_by_energy(energy: np.ndarray) -> np.ndarray:
+    """Compressive strength of a crushing energy [J/m^3], not below 0 [Pa]."""
+    none, some = energy_by_strength(0.0), energy_by_strength(1.0e8)
+    return np.maximum((energy - none) / (some - none) * 1.0e8, 0.0)
+
+
+def identify(
+    log: Log,
+    scene: Scene,
+    drive: Drive,
+    own_pressure: float,
+    rock: str | None = None,
+    collaring: float = COLLARING,
+    table: Table | None = None,
+    progress: Callable[[str, float | None], None] | None = None,
+) -> Profile:
+    """Return the rock along a hole.
+
+    Parameters
+    ----------
+    log : Log
+    scene : Scene
+        Hammer and bit; its solver makes the table.
+    drive : callable
+        Changes of the scene for a pressure [Pa].
+    own_pressure : float
+        Of the scene as it is [Pa].
+    rock : str, optional
+        Whose numbers are the prior; any rock if left out.
+    collaring : float
+        Hole that is left out at its collar [m].
+    table : Table, optional
+        One made before, whose range must hold the log's.
+    progress : callable, optional
+        Called with words and the share that is done.
+
+    Raises
+    ------
+    IdentifyError
+        If the log, or the hammer at its settings, tells nothing.
+    """
+    tell = progress or (lambda words, share: None)
+    own = {"pressure": own_pressure, "feed": scene["feed.force"], "speed": scene["rotation.speed"]}
+    samples = clean(log, own, collaring)
+    prior = prior_of(scene, rock)
+    if table is None:
+        table = tabulate(scene, drive, _ranges(samples, prior), lambda s: tell("runs a table", s))
+    samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
+    samples = samples.kept(table.contains(samples.settings), "pressure or feed out of the usual")
+    if len(samples.depth) < 2:
+        raise IdentifyError(f"{log.name}: no row has its pressure and feed in the table's range")
+    noise = noise_of(samples, table, prior)
+    found = RockFilter(table, prior.mean, prior.spread, noise)
+    return _along(samples, found, prior, noise, scene, tell)
+
+
+def _ranges(samples: Samples, prior: Prior) -> dict[str, tuple[float, float]]:
+    pressure, feed = ranges_of(samples)
+    rock = {
+        name: tuple(np.exp(prior.mean[k] + np.array([-REACH, REACH]) * prior.spread[k]).tolist())
+        for name, k in (("unloading_ratio", GAMMA), ("loading_stiffness", STIFFNESS))
+    }
+    return {"pressure": pressure, "feed": feed, **rock}
+
+
+def noise_of(samples: Samples, table: Table, prior: Prior) -> Noise:
+    """Noise of each signal by what it does from sample to sample beyond its settings.
+
+    Noise that goes on from one sample to the next counts for more, as many of its samples tell no
+    more than few.
+    """
+    count = len(samples.depth)
+    unknowns = np.broadcast_to(prior.mean, (count, len(UNKNOWNS)))
+    off = np.log(samples.signals) - table.predict(unknowns, samples.settings)
+    found = []
+    for k in range(len(SIGNALS)):
+        values = off[np.isfinite(off[:, k]), k]
+        if len(values) < 3:
+            found.append(LEAST_NOISE[k])
+            continue
+        one, two = (np.median(np.abs(values[n:] - values[:-n])) for n in (1, 2))
+        sigma = one / MAD / math.sqrt(2.0)
+        # of noise that fades by r from sample to sample, differences over 2 and 1 are 1 + r
+        kept = min(max((two / max(one, 1e-9)) ** 2 - 1.0, 0.0), 0.9)
+        sigma *= math.sqrt((1.0 + kept) / (1.0 - kept)) / math.sqrt(1.0 - kept)
+        found.append(float(np.clip(sigma, LEAST_NOISE[k], MOST_NOISE[k])))
+    return Noise(*found)
+
+
+def _along(
+    samples: Samples,
+    found: RockFilter,
+    prior: Prior,
+    noise: Noise,
+    scene: Scene,
+    tell: Callable[[str, float | None], None],
+) -> Profile:
+    count = len(samples.depth)
+    mean, spread = np.empty((count, len(UNKNOWNS))), np.empty((count, len(UNKNOWNS)))
+    layers: list[float] = []
+    deeper = np.diff(samples.depth, prepend=samples.depth[:1])
+    for k in range(count):
+        ago = found.sample(float(deeper[k]), samples.settings[k], samples.signals[k])
+        if ago:
+            layers.append(float(samples.depth[k - ago + 1]))
+            # found by samples that had been taken for the layer above
+            mean[k - ago + 1 : k], spread[k - ago + 1 : k] = found.x, found.sigma
+        mean[k], spread[k] = found.x, found.sigma
+        if k % 500 == 0:
+            tell("filters the log", k / count)
+    length, worn = scene["breaking.wear_length"], np.ones(count)
+    if length:
+        fresh = np.exp(-(scene["breaking.drilled"] + samples.depth - samples.depth[0]) / length)
+        worn = scene["breaking.worn"] + (1.0 - scene["breaking.worn"]) * fresh
+    return Profile(
+        samples.depth, mean, spread, layers, samples, found.table, prior, noise, worn, found.p
+    )
+
+
+def rate_error(profile: Profile) -> np.ndarray:
+    """Logarithms of the measured rates by those of the filter, of each sample."""
+    expected = profile.table.predict(profile.mean, profile.samples.settings)[:, RATE]
+    return np.log(profile.samples.signals[:, RATE]) - expected
