@@ -26,9 +26,10 @@ UNITS = {
     "m": ("m", "mm", "um", "cm", "in"),
     "s": ("s", "ms", "us"),
     "N": ("N", "kN", "MN", "lbf"),
-    "Pa": ("Pa", "kPa", "MPa", "GPa", "psi"),
-    "m/s": ("m/s", "mm/s", "km/h", "m/h", "m/min", "mm/min", "ft/h"),
+    "Pa": ("Pa", "kPa", "MPa", "GPa", "psi", "bar"),
+    "m/s": ("m/s", "mm/s", "km/h", "m/h", "m/min", "mm/min", "ft/h", "cm/min", "ft/min"),
     "rad/s": ("rad/s", "rpm"),
+    "Hz": ("Hz", "kHz", "1/min"),
     "N m": ("N m", "kN m", "ft lbf"),
     "J": ("J", "kJ", "ft lbf"),
     "m^3": ("m^3", "cm^3", "mm^3", "in^3"),
@@ -37,14 +38,14 @@ SEPARATORS = (";", "\t", ",")
 COMMENTS = ("#", "%", "//", "!")
 # The names of the columns stand in one of so many rows.
 MOST_HEADS = 100
-_SEPARATOR = re.compile(r'"?sep=(?P<mark>.)"?', re.IGNORECASE)
+SEPARATOR = re.compile(r'"?sep=(?P<mark>.)"?', re.IGNORECASE)
 # A name and its unit: force [kN], force (kN), force / kN, force in kN.
-_HEADING = re.compile(
+HEADING = re.compile(
     r"(?P<name>[^\[(/]+?)\s*(?:[\[(](?P<bracketed>[^\])]*)[\])]|/\s*(?P<behind>\S+)"
     r"|\sin\s(?P<said>\S+))?"
 )
 # The same with less of a mark: force kN, force_kN, "force, kN".
-_PLAIN = re.compile(r"(?P<name>.+?)(?: |_|,\s*)(?P<unit>[^ _,]+)")
+PLAIN = re.compile(r"(?P<name>.+?)(?: |_|,\s*)(?P<unit>[^ _,]+)")
 
 Row = tuple[int, list[str]]  # its number in the file, and its cells
 
@@ -65,7 +66,7 @@ def factor_of(unit: str | None, si: str, where: str) -> float:
     FitError
         If it is no unit of that quantity.
     """
-    plain = _plain_unit(unit or si)
+    plain = plain_unit(unit or si)
     if plain not in UNITS[si]:
         near = [one for one in UNITS[si] if one.casefold() == plain.casefold()]
         meant = f"; did you mean {near[0]}?" if near else ""
@@ -75,7 +76,7 @@ def factor_of(unit: str | None, si: str, where: str) -> float:
     return 1.0 if plain == si else float(factor(plain, si))
 
 
-def _plain_unit(unit: str) -> str:
+def plain_unit(unit: str) -> str:
     return unit.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
 
 
@@ -97,7 +98,7 @@ def read_columns(
     FitError
         If the file cannot be read so; the message names row and column.
     """
-    lines = _lines(path)
+    lines = read_lines(path)
     number, separator, titles = _heading_row(path, lines, known, wanted)
     headings = [
         Heading(*found, place)
@@ -113,7 +114,7 @@ def read_columns(
         del others[one.place + 1]
     rows = _rows(path, lines[number:], number, separator, titles)
     first = next(rows, None)
-    if first is not None and _is_of_units(first[1]):
+    if first is not None and has_no_number(first[1]):
         headings = [_with_unit(path, one, known[one.name], *first) for one in headings]
         first = next(rows, None)
     table = [*([first] if first else []), *rows]
@@ -131,7 +132,7 @@ def read_columns(
     return columns, [f"column {place}, {shortened(title)!r}" for place, title in others.items()]
 
 
-def _lines(path: Path) -> list[str]:
+def read_lines(path: Path) -> list[str]:
     """Lines of a file, whatever its encoding."""
     try:
         content = path.read_bytes()
@@ -150,7 +151,7 @@ def _lines(path: Path) -> list[str]:
     return re.split(r"\r\n|\r|\n", text)
 
 
-def _cells(line: str, separator: str) -> list[str]:
+def split_cells(line: str, separator: str) -> list[str]:
     """Cells of a line without its mark of a comment."""
     bare = line.strip(" ").lstrip("".join(COMMENTS)) if line.startswith(COMMENTS) else line
     try:
@@ -168,11 +169,11 @@ def _heading_row(
     best: tuple[int, int, str, list[str]] = (0, 0, "", [])
     seen: Row | None = None
     for number, line in enumerate(lines[:MOST_HEADS], 1):
-        if given := _SEPARATOR.fullmatch(line.strip()):
+        if given := SEPARATOR.fullmatch(line.strip()):
             marks = (given["mark"],)
             continue
         for mark in marks:
-            cells = _cells(line, mark)
+            cells = split_cells(line, mark)
             found = sum(_name_and_unit(cell, known) is not None for cell in cells)
             if found > best[0]:
                 best = found, number, mark, cells
@@ -192,12 +193,12 @@ def _heading_row(
 
 def _name_and_unit(title: str, known: Mapping[str, str]) -> tuple[str, str | None] | None:
     """Name of a column that is known, and its unit where it has one."""
-    parts = _HEADING.fullmatch(title)
+    parts = HEADING.fullmatch(title)
     if parts and (name := _key(parts["name"])) in known:
         return name, parts["bracketed"] or parts["behind"] or parts["said"]
-    parts = _PLAIN.fullmatch(title)
+    parts = PLAIN.fullmatch(title)
     if parts and (name := _key(parts["name"])) in known:
-        is_unit = _plain_unit(parts["unit"]) in UNITS[known[name]]
+        is_unit = plain_unit(parts["unit"]) in UNITS[known[name]]
         return (name, parts["unit"]) if is_unit else None
     return None
 
@@ -213,7 +214,7 @@ def _rows(
     for number, line in enumerate(lines, before + 1):
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
-        cells = _cells(line, separator)
+        cells = split_cells(line, separator)
         if not any(cells):
             continue
         while len(cells) > len(titles) and not cells[-1]:
@@ -228,16 +229,16 @@ def _rows(
         yield number, cells
 
 
-def _is_of_units(cells: Sequence[str]) -> bool:
+def has_no_number(cells: Sequence[str]) -> bool:
     """Whether a row has no number."""
-    return not any(_float(cell.replace(",", ".")) is not None for cell in cells)
+    return not any(finite(cell.replace(",", ".")) is not None for cell in cells)
 
 
 def _with_unit(path: Path, one: Heading, si: str, number: int, cells: Sequence[str]) -> Heading:
     """The heading with the unit that a row of units has for it."""
     unit = cells[one.place] or one.unit
     factor_of(unit, si, f"{path}: row {number}, column {one.place + 1} ({one.name})")
-    if one.unit and unit and _plain_unit(unit) != _plain_unit(one.unit):
+    if one.unit and unit and plain_unit(unit) != plain_unit(one.unit):
         raise FitError(
             f"{path}: row {number}, column {one.place + 1}: {shortened(unit)!r} is another unit "
             f"than {one.unit!r} above"
@@ -245,7 +246,7 @@ def _with_unit(path: Path, one: Heading, si: str, number: int, cells: Sequence[s
     return one._replace(unit=unit)
 
 
-def _float(word: str) -> float | None:
+def finite(word: str) -> float | None:
     """A finite number; Python would take 1_0 as well."""
     try:
         found = float(word.replace("−", "-"))
@@ -257,7 +258,7 @@ def _float(word: str) -> float | None:
 def _number(path: Path, row: Row, one: Heading, separator: str) -> float:
     """Number of a cell, with a decimal comma where commas do not separate columns."""
     word = row[1][one.place]
-    found = _float(word if separator == "," else word.replace(",", "."))
+    found = finite(word if separator == "," else word.replace(",", "."))
     if found is None:
         said = f"{shortened(word)!r} is no number" if word else "is empty"
         comma = ": commas separate the columns, decimals have a point" if "," in word else ""

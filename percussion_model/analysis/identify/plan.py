@@ -1,0 +1,117 @@
+"""Which change of settings in the next metre would tell most of the rock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from percussion_model.analysis.identify.filter import ALIKE, VARIES
+from percussion_model.analysis.identify.observation import (
+    Q,
+    RATE,
+    SETTINGS,
+    SIGNALS,
+    UNKNOWNS,
+    Table,
+)
+from percussion_model.analysis.identify.profile import SURE, Profile
+
+# Shares of a setting that are tried, and hole that is drilled [m], half of it changed.
+SHARES = {"pressure": (0.85, 0.92, 1.08), "feed": (0.85, 1.15, 1.3), "speed": (0.4, 0.6, 1.5)}
+METRE, CHANGED = 1.0, 0.5
+# Room of a table beyond the settings of a log, so that changes lie in it.
+ROOM = {"pressure": (0.84, 1.09), "feed": (0.84, 1.31)}
+_STEP = 0.05  # of slopes, by the logarithm
+
+
+@dataclass(frozen=True)
+class Change:
+    """A setting that is changed for half of the next metre.
+
+    Attributes
+    ----------
+    setting : str
+        By `SETTINGS`; empty for none.
+    share, value : float
+        Of the present value; the new one, SI.
+    spread : float
+        Standard deviation of ln q after that metre.
+    narrowed : dict of float
+        Standard deviations of other unknowns by those without the change, where less than 0.9.
+    """
+
+    setting: str
+    share: float
+    value: float
+    spread: float
+    narrowed: dict[str, float]
+
+    @property
+    def interval(self) -> float:
+        """Half the interval of 95 % of q, by its value."""
+        return math.exp(SURE * self.spread) - 1.0
+
+
+def plan(profile: Profile) -> list[Change]:
+    """Return changes by what they tell, the best first; no change is among them.
+
+    By Fisher's information of the next metre: half of it as now, half with one setting changed,
+    added to what is known behind the last sample.
+    """
+    now = np.median(profile.samples.settings[-20:], axis=0)
+    given = np.isfinite(profile.samples.signals).any(axis=0)
+    rate = float(np.nanmedian(profile.samples.signals[-100:, RATE]))
+    step = np.diff(profile.depth)
+    spacing = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else rate
+    count = METRE / max(spacing, 1e-4)
+    none = _after(profile, [now], [count], given)
+    found = [Change("", 1.0, 0.0, float(none[Q]), {})]
+    for k, name in enumerate(SETTINGS):
+        for share in SHARES[name]:
+            other = now.copy()
+            other[k] *= share
+            if not profile.table.contains(other[np.newaxis])[0]:
+                continue
+            both = [(1.0 - CHANGED) * count, CHANGED * count]
+            spread = _after(profile, [now, other], both, given)
+            less = {
+                one: float(spread[j] / none[j])
+                for j, one in enumerate(UNKNOWNS)
+                if j != Q and spread[j] < 0.9 * none[j]
+            }
+            found.append(Change(name, share, float(other[k]), float(spread[Q]), less))
+    return sorted(found, key=lambda one: one.spread)
+
+
+def _after(
+    profile: Profile, settings: Sequence[np.ndarray], counts: Sequence[float], given: np.ndarray
+) -> np.ndarray:
+    """Standard deviations of the unknowns after samples at settings."""
+    table, x = profile.table, profile.mean[-1]
+    slopes, noise = [], []
+    for one, count in zip(settings, counts, strict=True):
+        slopes.append(slopes_of(table, x, one)[given])
+        own = profile.noise.values() ** 2 / count + np.array([VARIES**2, 0.0, 0.0])
+        noise.append(own[given])
+    errors = np.diag(table.errors[given] ** 2)
+    matrix, rows = np.concatenate(slopes), len(settings)
+    alike = np.eye(rows)
+    for a, b in pairwise(range(rows)):
+        off = np.log(settings[a] / settings[b]) / (3.0 * ALIKE)
+        alike[a, b] = alike[b, a] = math.exp(-0.5 * float(off @ off))
+    total = matrix @ profile.covariance @ matrix.T + np.kron(alike, errors)
+    total += np.diag(np.concatenate(noise))
+    gain = np.linalg.solve(total, matrix @ profile.covariance).T
+    return np.sqrt(np.diag(profile.covariance - gain @ matrix @ profile.covariance))
+
+
+def slopes_of(table: Table, unknowns: np.ndarray, settings: np.ndarray) -> np.ndarray:
+    """Slopes of the signals' logarithms by those of the unknowns, shape (3, 6)."""
+    steps = _STEP * np.eye(len(unknowns))
+    values = table.predict(np.concatenate([unknowns + steps, unknowns - steps]), settings)
+    up, down = values[: len(unknowns)], values[len(unknowns) :]
+    return np.asarray((up - down).T.reshape(len(SIGNALS), -1) / (2.0 * _STEP))
