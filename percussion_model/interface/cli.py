@@ -40,6 +40,7 @@ from percussion_model.interface.commands.drive_map import drive_map
 from percussion_model.interface.commands.effects import effects
 from percussion_model.interface.commands.explore import explore
 from percussion_model.interface.commands.hammers import hammers
+from percussion_model.interface.commands.identify import identify
 from percussion_model.interface.commands.paper import paper
 from percussion_model.interface.commands.rocks import rocks
 from percussion_model.interface.commands.scene import explain, new, plot, run, settled
@@ -170,6 +171,7 @@ for _command in (
     paper,
     validate,
     calibrate,
+    identify,
     stability,
     couple,
     bench_controller,

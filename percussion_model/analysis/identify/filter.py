@@ -46,11 +46,14 @@ HUBER = 2.5
 # so many in thousands of samples only if there is one.
 WINDOWS, LAYER = (4, 8, 16), 5.0
 MEMORY = max(WINDOWS)
+FEWEST = 2  # of a new layer
 # Samples behind a change of layer before the next is looked for; those that make a mean that is
 # known by itself.
 PAUSE, KNOWN = 8, 6.0
-# Sigma points, by alpha and beta of the literature, and how often an update is made again.
-ALPHA, BETA, AGAIN = 0.8, 2.0, 1
+# Sigma points, by alpha and beta of the literature; parts of its way that an update may go.
+ALPHA, BETA, STEPS = 0.8, 2.0, (0.0, 0.25, 0.5, 1.0)
+# Of less weight a mean says nothing.
+LEAST_WEIGHT = 1e-3
 # Columns of a group: weight, logarithms of settings; by signal weight and mean of the logarithm.
 _SETTINGS, _WEIGHTS, _MEANS = slice(1, 4), slice(4, 7), slice(7, 10)
 WIDTH = 10
@@ -191,30 +194,53 @@ class RockFilter:
 
     def solve(self) -> None:
         """Update what was known when the layer began with the means of its groups."""
-        there = self.groups[:, _WEIGHTS] > 1e-3
-        if not there.any():
+        at = np.flatnonzero(self.groups[:, _WEIGHTS] > LEAST_WEIGHT)
+        if not len(at):
             self.x, self.p = self.x0, self.p0
             return
-        at = np.flatnonzero(there)
         measured = self.groups[:, _MEANS].ravel()[at]
         noise = self._noise_of_means()[np.ix_(at, at)]
-        many = len(self.groups)
+        points, weights, wide = self._points()
+        values = self._means_at(points)[:, at]
+        mean = weights @ values
+        off, from_x = values - mean, points - self.x
+        slopes = np.linalg.solve(self.p, (wide * from_x.T) @ off).T
+        own = (wide * off.T) @ off
+        curved = own - slopes @ self.p @ slopes.T
+        size = np.abs(values[0] - measured) / np.sqrt(np.diag(own + noise))
+        # a mean of samples on both sides of a layer fits nothing
+        noise += np.diag(np.diag(noise) * (np.maximum(size / HUBER, 1.0) ** 2 - 1.0))
+        total = slopes @ self.p0 @ slopes.T + noise + curved
+        gain = np.linalg.solve(total, slopes @ self.p0).T
+        move = self.x0 + gain @ (measured - mean - slopes @ (self.x0 - self.x)) - self.x
+        self._go(move, measured, noise, at)
+        p = self.p0 - gain @ total @ gain.T
+        self.p = 0.5 * (p + p.T)
+
+    def _means_at(self, points: np.ndarray) -> np.ndarray:
+        """Logarithms of the signals of all groups, by group and signal, for unknowns at points."""
         settings = np.exp(self.groups[:, _SETTINGS])
-        for _ in range(AGAIN):
-            points, weights, wide = self._points()
-            count = len(points)
-            values = self.table.predict(
-                np.repeat(points, many, axis=0), np.tile(settings, (count, 1))
-            ).reshape(count, -1)[:, at]
-            mean = weights @ values
-            off, from_x = values - mean, points - self.x
-            slopes = np.linalg.solve(self.p, (wide * from_x.T) @ off).T
-            curved = (wide * off.T) @ off - slopes @ self.p @ slopes.T
-            total = slopes @ self.p0 @ slopes.T + noise + curved
-            gain = np.linalg.solve(total, slopes @ self.p0).T
-            self.x = self.x0 + gain @ (measured - mean - slopes @ (self.x0 - self.x))
-            p = self.p0 - gain @ total @ gain.T
-            self.p = 0.5 * (p + p.T)
+        many, count = len(settings), len(points)
+        unknowns = np.repeat(points, many, axis=0)
+        return self.table.predict(unknowns, np.tile(settings, (count, 1))).reshape(count, -1)
+
+    def _go(self, move: np.ndarray, measured: np.ndarray, noise: np.ndarray, at: np.ndarray) -> None:
+        """Go the most likely part of a way, or to the q that the rates tell with all else as it is.
+
+        Where hardly anything breaks, slopes lead astray.
+        """
+        tried = self.x + np.outer(STEPS, move)
+        from_here = np.stack([self.x, self.x0])
+        rates = np.flatnonzero(at % len(SIGNALS) == RATE)
+        if len(rates):
+            off = self._means_at(from_here)[:, at[rates]] - measured[rates]
+            from_here[:, Q] += np.mean(off, axis=1)
+            tried = np.concatenate([tried, from_here])
+        off = self._means_at(tried)[:, at] - measured
+        from_x0 = tried - self.x0
+        unlikely = np.sum(off * np.linalg.solve(noise, off.T).T, axis=1)
+        unlikely += np.sum(from_x0 * np.linalg.solve(self.p0, from_x0.T).T, axis=1)
+        self.x = tried[int(np.argmin(unlikely))]
 
     def _noise_of_means(self) -> np.ndarray:
         """Covariance of the groups' means, by group and signal: noise, rock, and the table."""
@@ -222,23 +248,24 @@ class RockFilter:
         apart = settings[:, np.newaxis] - settings
         alike = np.exp(-0.5 * np.sum(apart**2, axis=2))
         found = np.kron(alike, np.diag(self.table.errors**2))
-        own = self.noise**2 / np.maximum(self.groups[:, _WEIGHTS], 1e-3)
+        own = self.noise**2 / np.maximum(self.groups[:, _WEIGHTS], LEAST_WEIGHT)
         own[:, RATE] += VARIES**2
         return found + np.diag(own.ravel())
 
     def _layer_began(self) -> int:
-        """Samples ago at which a layer began, by their mean; 0 where none did."""
-        most, found = LAYER, 0
-        if self.since > PAUSE:
-            for window in WINDOWS:
-                if len(self.memory) >= window:
-                    last = self.memory[-window:]
-                    common = sum(one.variance for one in last) / window
-                    error = math.sqrt(self.noise[RATE] ** 2 / window + common)
-                    size = abs(sum(one.off for one in last)) / window / error
-                    if size > most:
-                        most, found = size, window
-        return found
+        """Samples ago at which a layer began, by the mean of those since; 0 where none did."""
+        if self.since <= PAUSE or max(map(self._size, WINDOWS)) <= LAYER:
+            return 0
+        return max(range(FEWEST, MEMORY + 1), key=self._size)
+
+    def _size(self, window: int) -> float:
+        """How far the latest samples are off, in standard deviations of their mean."""
+        if len(self.memory) < window:
+            return 0.0
+        last = self.memory[-window:]
+        common = sum(one.variance for one in last) / window
+        error = math.sqrt(self.noise[RATE] ** 2 / window + common)
+        return abs(sum(one.off for one in last)) / window / error
 
     def _begin_layer(self, ago: int) -> None:
         """Go back by some samples, forget what a new layer may change, and take them again."""

@@ -32,6 +32,8 @@ RATE, FREQUENCY, TORQUE = range(len(SIGNALS))
 CRUSHED, BLOWS, WORK, FORCE, RUBBING = range(5)
 # Where nothing breaks, the energy beyond the threshold counts as this share of the blow's.
 LEAST = 1e-3
+# Polynomials are not asked further out than this, by half the range of the table.
+EDGE = 1.1
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,8 @@ class Table:
         -------
         ndarray, shape (5, n)
         """
-        return self.terms @ basis((points - self.middle) / self.half, self.powers).T
+        inside = np.clip((points - self.middle) / self.half, -EDGE, EDGE)
+        return self.terms @ basis(inside, self.powers).T
 
     def predict(self, unknowns: np.ndarray, settings: np.ndarray) -> np.ndarray:
         """Logarithms of what a rig measures.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,12 +11,14 @@ import numpy as np
 
 from percussion_model.analysis.identify.cleaning import (
     COLLARING,
+    FEWEST,
     Log,
     Samples,
     clean,
     ranges_of,
     without_lags,
 )
+from percussion_model.analysis.identify.drill import Drill
 from percussion_model.analysis.identify.filter import Noise, RockFilter
 from percussion_model.analysis.identify.observation import (
     GAMMA,
@@ -28,7 +30,7 @@ from percussion_model.analysis.identify.observation import (
     Table,
 )
 from percussion_model.analysis.identify.prior import WITHIN, Prior, prior_of
-from percussion_model.analysis.identify.tabulate import REACH, Drive, IdentifyError, tabulate
+from percussion_model.analysis.identify.tabulate import REACH, IdentifyError, tabulate
 from percussion_model.scene.rocks.breaking import (
     EFFICIENCY,
     ENERGY_SHARES,
@@ -140,12 +142,11 @@ def strength_by_energy(energy: np.ndarray) -> np.ndarray:
 
 def identify(
     log: Log,
-    scene: Scene,
-    drive: Drive,
-    own_pressure: float,
+    drill: Drill,
     rock: str | None = None,
     collaring: float = COLLARING,
     table: Table | None = None,
+    room: Mapping[str, tuple[float, float]] | None = None,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> Profile:
     """Return the rock along a hole.
@@ -153,18 +154,16 @@ def identify(
     Parameters
     ----------
     log : Log
-    scene : Scene
-        Hammer and bit; its solver makes the table.
-    drive : callable
-        Changes of the scene for a pressure [Pa].
-    own_pressure : float
-        Of the scene as it is [Pa].
+    drill : Drill
+        Hammer and bit; the solver of its scene makes the table.
     rock : str, optional
         Whose numbers are the prior; any rock if left out.
     collaring : float
         Hole that is left out at its collar [m].
     table : Table, optional
         One made before, whose range must hold the log's.
+    room : mapping of tuple, optional
+        Shares of the least and the greatest pressure and feed that the table is to reach.
     progress : callable, optional
         Called with words and the share that is done.
 
@@ -174,27 +173,39 @@ def identify(
         If the log, or the hammer at its settings, tells nothing.
     """
     tell = progress or (lambda words, share: None)
-    own = {"pressure": own_pressure, "feed": scene["feed.force"], "speed": scene["rotation.speed"]}
+    drill, said = drill.at_pressure_of(log)
+    scene = drill.scene
+    own = {"pressure": drill.pressure or 1.0, "feed": scene["feed.force"],
+           "speed": scene["rotation.speed"]}  # fmt: skip
     samples = clean(log, own, collaring)
     prior = prior_of(scene, rock)
     if table is None:
-        table = tabulate(scene, drive, _ranges(samples, prior), lambda s: tell("runs a table", s))
+        wanted = _ranges(samples, prior, room or {})
+        table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s))
     samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
     samples = samples.kept(table.contains(samples.settings), "pressure or feed out of the usual")
-    if len(samples.depth) < 2:
-        raise IdentifyError(f"{log.name}: no row has its pressure and feed in the table's range")
+    if len(samples.depth) < FEWEST:
+        raise IdentifyError(
+            f"{log.name}: {len(samples.depth)} rows have pressure and feed in the range of the "
+            f"table, at least {FEWEST} are wanted"
+        )
+    samples.notes += [said] * bool(said)
     noise = noise_of(samples, table, prior)
     found = RockFilter(table, prior.mean, prior.spread, noise)
     return _along(samples, found, prior, noise, scene, tell)
 
 
-def _ranges(samples: Samples, prior: Prior) -> dict[str, tuple[float, float]]:
-    pressure, feed = ranges_of(samples)
-    rock = {
-        name: tuple(np.exp(prior.mean[k] + np.array([-REACH, REACH]) * prior.spread[k]).tolist())
-        for name, k in (("unloading_ratio", GAMMA), ("loading_stiffness", STIFFNESS))
-    }
-    return {"pressure": pressure, "feed": feed, **rock}
+def _ranges(
+    samples: Samples, prior: Prior, room: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    found = {}
+    for name, (low, high) in zip(("pressure", "feed"), ranges_of(samples), strict=True):
+        less, more = room.get(name, (1.0, 1.0))
+        found[name] = less * low, more * high
+    for name, k in (("unloading_ratio", GAMMA), ("loading_stiffness", STIFFNESS)):
+        off = REACH * prior.spread[k]
+        found[name] = math.exp(prior.mean[k] - off), math.exp(prior.mean[k] + off)
+    return found
 
 
 def noise_of(samples: Samples, table: Table, prior: Prior) -> Noise:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from percussion_model.analysis.identify.cleaning import Log
+from percussion_model.analysis.identify.drill import Drill
 from percussion_model.analysis.identify.observation import (
     FRICTION,
     GAMMA,
@@ -21,9 +22,8 @@ from percussion_model.analysis.identify.observation import (
     UNKNOWNS,
 )
 from percussion_model.analysis.identify.prior import KEYS, Prior
-from percussion_model.analysis.identify.tabulate import ETA, Drive, IdentifyError
+from percussion_model.analysis.identify.tabulate import ETA, IdentifyError
 from percussion_model.analysis.stationary import settled
-from percussion_model.scene.scene import Scene
 
 # What changes from layer to layer, and how much the crushing energy then does, by its logarithm;
 # the others stay as they are in the hole but for this.
@@ -59,8 +59,7 @@ class Hole:
 
 
 def make_hole(
-    scene: Scene,
-    drive: Drive,
+    drill: Drill,
     prior: Prior,
     schedule: Sequence[Mapping[str, float]],
     seed: int,
@@ -72,8 +71,8 @@ def make_hole(
 
     Parameters
     ----------
-    scene : Scene
-        Its solver is that of the truth.
+    drill : Drill
+        With a pressure; the solver of its scene is that of the truth.
     schedule : sequence of mapping
         "pressure" [Pa], "feed" [N] and "speed" [rad/s] that follow each other, each for `held`
         metres; one, and nothing changes.
@@ -96,7 +95,7 @@ def make_hole(
         layer = int(np.searchsorted(tops, here, side="right")) - 1
         which = int(here / held) % len(schedule)
         if (layer, which) not in known:
-            known[layer, which] = _settled(scene, drive, unknowns[layer], schedule[which])
+            known[layer, which] = _settled(drill, unknowns[layer], schedule[which])
         signals, given = known[layer, which], schedule[which]
         soft = min(1.0, 0.5 + here)  # collaring with less of all
         rows.append((time, here, *(soft * given[k] for k in ("pressure", "feed")), given["speed"],
@@ -109,16 +108,14 @@ def make_hole(
     return Hole(_with_faults(np.array(rows), seed, random), np.array(tops), unknowns)
 
 
-def _settled(
-    scene: Scene, drive: Drive, unknowns: np.ndarray, given: Mapping[str, float]
-) -> np.ndarray:
+def _settled(drill: Drill, unknowns: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
     """Rate, frequency and torque of the truth, SI."""
+    scene = drill.scene
     values = dict(zip(KEYS, np.exp(unknowns).tolist(), strict=False))
     values[KEYS[0]] *= scene[ETA]
     setting = {"feed.force": given["feed"], "rotation.speed": given["speed"]}
-    found = settled(
-        scene.replace(**dict(drive(given["pressure"])), **setting, **values), 1e-3, 200, scatter=0.01
-    )
+    changed = scene.replace(**drill.changes(given["pressure"]), **setting, **values)
+    found = settled(changed, 1e-3, 200, scatter=0.01)
     if not found.rate_of_penetration > 0.0:
         raise IdentifyError("the hammer does not drill in a layer that was drawn")
     torque = float(np.mean(found.counted["rotation_torque"]))
@@ -149,3 +146,33 @@ def _with_faults(rows: np.ndarray, seed: int, random: np.random.Generator) -> Lo
     kept[:1] = True
     columns = {name: values[kept] for name, values in columns.items()}
     return Log(f"hole {seed}", columns, np.flatnonzero(kept) + 2)
+
+
+def steps_of(drill: Drill) -> list[dict[str, float]]:
+    """Settings that tell rock and bit apart: as usual, less rotation, less pressure, more feed."""
+    assert drill.pressure is not None
+    usual = {
+        "pressure": drill.pressure, "feed": 1.1 * drill.scene["feed.force"],
+        "speed": drill.scene["rotation.speed"],
+    }  # fmt: skip
+    return [
+        usual, usual | {"speed": 0.4 * usual["speed"]},
+        usual | {"pressure": 0.88 * usual["pressure"]}, usual | {"feed": 1.14 * usual["feed"]},
+    ]  # fmt: skip
+
+
+def csv_text(hole: Hole) -> str:
+    """Return a log as a rig would write it: its units in the heading, empty cells where none is."""
+    shown = {
+        "time": ("Time [s]", 1.0, ".0f"), "depth": ("Hole depth [m]", 1.0, ".3f"),
+        "rate": ("Penetration rate [m/min]", 60.0, ".3f"),
+        "pressure": ("Percussion pressure [bar]", 1e-5, ".2f"),
+        "feed": ("Feed force [kN]", 1e-3, ".2f"),
+        "speed": ("Rotation speed [rpm]", 30.0 / np.pi, ".1f"),
+        "frequency": ("Frequency [Hz]", 1.0, ".2f"), "torque": ("Torque [N m]", 1.0, ".0f"),
+    }  # fmt: skip
+    lines = [",".join(head for head, _, _ in shown.values())]
+    for k in range(len(hole.log.rows)):
+        values = [(hole.log.columns[name][k] * f, form) for name, (_, f, form) in shown.items()]
+        lines.append(",".join(f"{v:{form}}" if np.isfinite(v) else "" for v, form in values))
+    return "\n".join(lines) + "\n"

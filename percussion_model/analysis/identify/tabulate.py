@@ -23,8 +23,8 @@ DEGREE = 3
 POINTS = 140  # four to a term
 # Half the least range of a setting, by the logarithm, and standard deviations of an unknown.
 LEAST_HALF, REACH = 0.02, 2.2
-# What a run may be off by: a hundredth in the rate of a motion that does not settle.
-TOLERANCE, SCATTER, MOST_BLOWS = 1e-3, 0.01, 400
+# What a run may be off by: two hundredths in the rate of a motion that does not settle.
+TOLERANCE, SCATTER, MOST_BLOWS = 1e-3, 0.02, 150
 # Errors of the table by those of points left out of it: they go together from point to point and
 # from layer to layer, and motions of several kinds lie in one table.
 DOUBT = 1.3

@@ -1,0 +1,157 @@
+"""Command `identify`: the rock along a hole from a log of the rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from percussion_model.interface.commands import common
+
+if TYPE_CHECKING:
+    from percussion_model.analysis.identify.drill import Drill
+    from percussion_model.analysis.identify.profile import Profile
+
+_PRESSURE = "Pressure at which the drive of the hammer holds; stored for dth hammers."
+_EVERY = "Step of depth of the rows that are written."
+_COLLARING = "Hole at its collar that is left out."
+
+
+def identify(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of a drill rig, as text.")],
+    hammer: Annotated[
+        str, typer.Option("--hammer", metavar="NAME|SCENE", help="A hammer, or a scene file.")
+    ],
+    bit: common.BitName = None,
+    rock: Annotated[
+        str | None,
+        typer.Option("--rock", metavar="NAME", help="Begin with what is known of a rock."),
+    ] = None,
+    columns: Annotated[
+        Path | None,
+        typer.Option("--columns", metavar="TOML", help="Names, units, factors of the columns."),
+    ] = None,
+    pressure: Annotated[
+        float | None,
+        common.number_option("--pressure", "PRESSURE", "pneumatic.supply_pressure", _PRESSURE),
+    ] = None,
+    every: Annotated[
+        float, common.number_option("--every", "LENGTH", "start.depth", _EVERY)
+    ] = 0.1,
+    collaring: Annotated[
+        float, common.number_option("--collaring", "LENGTH", "start.depth", _COLLARING)
+    ] = 0.5,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Tell which change in the next metre would tell most.")
+    ] = False,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Write LOG first: a hole through layers, of travelling waves."),
+    ] = False,
+    settings: common.Settings = None,
+    solver: common.SolverName = None,
+    out: common.OutOrDefault = None,
+    json_file: common.JsonFile = None,
+    force: common.Force = False,
+) -> None:
+    """Tell the rock along a hole from a log of the rig, in out/LOG-rock."""
+    from percussion_model.analysis.identify.plan import ROOM
+    from percussion_model.analysis.identify.plan import plan as plan_next
+    from percussion_model.analysis.identify.profile import identify as tell_rock
+    from percussion_model.interface.drill_log import read_log
+    from percussion_model.interface.progress import progress
+
+    if not every > 0.0:
+        raise common.refusal(f"--every {every:g}: must be above 0 m")
+    drill = _drill(hammer, bit, settings, solver, pressure)
+    common.check_json(json_file)
+    if example:
+        common.refuse_existing(log, force)
+        _write_example(log, drill)
+    read = read_log(log, columns)
+    claimed = common.claim(
+        "identify", out, Path("out") / f"{log.stem}-rock", force, log=common.digest(log),
+        columns=common.digest(columns), scene=drill.scene, pressure=pressure, rock=rock,
+        every=every, collaring=collaring, plan=plan,
+    )  # fmt: skip
+    common.tell_of_compiling(drill.scene.solver_name)
+    with progress("reading the log") as report:
+        found = tell_rock(
+            read, drill, rock, collaring, room=ROOM if plan else None, progress=report
+        )
+    changes = plan_next(found) if plan else []
+    summary = found.summary()
+    if plan:
+        summary["plan"] = [
+            {"setting": one.setting, "share": one.share, "value": one.value,
+             "interval": one.interval, "narrowed": one.narrowed}
+            for one in changes
+        ]  # fmt: skip
+    common.write_json(json_file, summary)
+    from percussion_model.interface import identify_text
+
+    if json_file != "-":
+        _show(found)
+        if changes:
+            print(identify_text.plan_words(changes))
+    with common.if_drawable():
+        files = common.write_folder(
+            claimed,
+            lambda folder: identify_text.write_pages(
+                found, folder, log.name, hammer, every, changes
+            ),
+        )
+        common.list_files([*files, *common.sign(claimed)])
+
+
+def _drill(
+    hammer: str,
+    bit: str | None,
+    settings: list[str] | None,
+    solver: str | None,
+    pressure: float | None,
+) -> Drill:
+    from percussion_model.analysis.identify.drill import drill_of
+    from percussion_model.scene.hammers import hammer as hammer_of
+    from percussion_model.scene.hammers import hammers
+    from percussion_model.scene.scene import Scene
+    from percussion_model.scene.text import read_setting
+
+    scene = hammer_of(hammer) if hammer in hammers() else Scene.from_toml(hammer)
+    scene = common.with_bit(scene, bit)
+    changes = dict(read_setting(text) for text in settings or ())
+    scene = scene.computed_by(solver, **changes) if solver else scene.replace(**changes)
+    return drill_of(scene, hammer, pressure)
+
+
+def _write_example(log: Path, drill: Drill) -> None:
+    """Write the log of a hole whose truth is drilled by waves, where the filter has modes."""
+    from percussion_model.analysis.identify.prior import prior_of
+    from percussion_model.analysis.identify.synthetic import csv_text, make_hole, steps_of
+    from percussion_model.analysis.identify.tabulate import IdentifyError
+    from percussion_model.interface.progress import progress
+
+    if drill.pressure is None:
+        raise IdentifyError("--example: give the hammer's pressure by --pressure")
+    common.tell_of_compiling("wave")
+    truth = type(drill)(drill.scene.computed_by("wave"), drill.pressure)
+    with progress("drilling the example"):
+        hole = make_hole(truth, prior_of(truth.scene, "kuru-granite"), steps_of(drill), seed=3)
+    common.list_files([common.write_file(log, csv_text(hole))])
+
+
+def _show(found: Profile) -> None:
+    from percussion_model.interface import identify_text
+    from percussion_model.interface.tables import airy_table, print_notes, print_table
+
+    table = airy_table(list(identify_text.LAYER_HEADS), (), pad_edge=False)
+    for row in identify_text.layer_rows(found):
+        table.add_row(*row)
+    print_table(table)
+    rest = airy_table(["", "value", "95 %", ""], (), pad_edge=False)
+    for row in identify_text.unknown_rows(found):
+        rest.add_row(*row)
+    print_table(rest)
+    counts = ", ".join(f"{rule} {count}" for rule, count in identify_text.count_rows(found))
+    print_notes([f"Rows: {counts}.", *identify_text.notes(found)])
