@@ -38,7 +38,11 @@ MODEL_FILES = (
     "solvers/**/*.py",
 )
 # What parts take of it.
-PART_FILES = ("__init__.py", "scene/__init__.py", "scene/rows.py", "scene/retired.py")
+PART_FILES = (
+    "__init__.py", "scene/__init__.py", "scene/rows.py", "scene/retired.py",
+    "analysis/__init__.py",
+    *(f"analysis/identify/{name}.py" for name in ("__init__", "filter", "observation", "part")),
+)  # fmt: skip
 LIBRARY_FILES = (
     "_version.py",
     "default_experiment.py",

@@ -13,6 +13,7 @@ from fmu_src.parts import (
     controller,
     drill_string,
     rig_feed,
+    rock_filter,
     rock_profile,
     supply,
     wave_string,
@@ -33,7 +34,9 @@ STOP_TIME, STEP_SIZE = 4.0, 1e-3
 # Parts of a drilling system, by the name of their FMU.
 PARTS = {
     module.TABLE.name: module.TABLE
-    for module in (drill_string, wave_string, rig_feed, supply, rock_profile, controller)
+    for module in (
+        drill_string, wave_string, rig_feed, supply, rock_profile, controller, rock_filter,
+    )  # fmt: skip
 }
 
 

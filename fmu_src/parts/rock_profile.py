@@ -42,11 +42,10 @@ class RockProfile(Model):
         self._between: tuple[int | None, float, float] = (None, 0.0, 0.0)
         self._arm = parameters["torque_arm"]
 
-    def _layer(self, number: int) -> tuple[float, float, float, float, int]:
-        """Top [m], K_R [N/m], gamma, torque factor and number of a layer."""
-        names = ("top", "loading_stiffness", "unloading_ratio", "torque_factor")
-        top, stiffness, ratio, torque = (self.parameters[f"layers[{number}].{n}"] for n in names)
-        return top, stiffness, ratio, torque, number
+    def _layer(self, number: int) -> tuple[float, float, float, float, float, int]:
+        """Top [m], K_R [N/m], gamma, torque factor, e_c [J/m^3] and number of a layer."""
+        top, *numbers = (self.parameters[f"layers[{number}].{name}"] for name in _LAYER)
+        return top, *numbers, number  # type: ignore[return-value]
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""
@@ -86,7 +85,7 @@ class RockProfile(Model):
             self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
         return self._knots[number]
 
-    def _layer_at_depth(self) -> tuple[float, float, float, float, int]:
+    def _layer_at_depth(self) -> tuple[float, float, float, float, float, int]:
         return self.layers[max(0, bisect_right(self.tops, self.depth) - 1)]
 
     def _quadratic_factor(self, value: float, name: str, best: str) -> float:
@@ -99,19 +98,20 @@ class RockProfile(Model):
 
     def signals(self) -> dict[str, Any]:
         """What hammer and controller take."""
-        _, stiffness, ratio, torque, _ = self._layer_at_depth()
+        _, stiffness, ratio, torque, energy, _ = self._layer_at_depth()
         factor = self.variation(self.depth)
         factor *= self._quadratic_factor(self.feed, "best_feed", "force")
         factor *= self._quadratic_factor(self.pressure, "best_pressure", "pressure")
         return {
             "loading_stiffness": stiffness * factor,
             "unloading_ratio": ratio,
+            "crushing_energy": energy,
             "rotation_torque": self._arm * torque * self.feed + self.torque,
         }
 
     def outputs(self) -> dict[str, Any]:
         """Present values by name."""
-        _, stiffness, _, _, which = self._layer_at_depth()
+        _, stiffness, *_, which = self._layer_at_depth()
         return self.signals() | {
             "depth": self.depth,
             "in_void": stiffness <= self.parameters["void_stiffness"],
@@ -127,9 +127,11 @@ _LAYER = {
     "loading_stiffness": ("N/m", 1e3, 1e13, "loading stiffness K_R"),
     "unloading_ratio": ("1", 1.0, 1e4, "gamma: unloading by loading stiffness"),
     "torque_factor": ("1", 0.0, 100.0, "torque on the rotation, divided by that of sound rock"),
+    "crushing_energy": ("J/m^3", 0.0, 1e12, "e_c, for a hammer with effects.breaking"),
 }
 _LAYER_START = {
     "top": -1.0, "loading_stiffness": 7.5e8, "unloading_ratio": 5.0, "torque_factor": 1.0,
+    "crushing_energy": 5.5e7,
 }  # fmt: skip
 
 
@@ -156,6 +158,7 @@ TABLE = PartTable(
     outputs={
         "loading_stiffness": ("N/m", "loading stiffness K_R at the bit"),
         "unloading_ratio": ("1", "gamma at the bit"),
+        "crushing_energy": ("J/m^3", "e_c at the bit"),
         "depth": ("m", "greatest depth of the bit"),
         "rotation_torque": ("N.m", "torque on the rotation, that of the bit and by the rock"),
         "in_void": (False, "whether the layer is soft enough to count as a void"),
@@ -177,6 +180,7 @@ TABLE = PartTable(
     at_start={
         "loading_stiffness": ("bit_position", "feed_force", "supply_pressure"),
         "unloading_ratio": ("bit_position",),
+        "crushing_energy": ("bit_position",),
         "depth": ("bit_position",),
         "rotation_torque": ("bit_position", "feed_force", "bit_torque"),
         "in_void": ("bit_position",),

@@ -59,6 +59,7 @@ def tabulate(
     ranges: Mapping[str, tuple[float, float]],
     progress: Callable[[float], None] | None = None,
     points: int = POINTS,
+    degree: int = DEGREE,
 ) -> Table:
     """Run a hammer over ranges of its settings and of the rock, and fit polynomials.
 
@@ -73,6 +74,8 @@ def tabulate(
         "loading_stiffness" [N/m].
     progress : callable, optional
         Called with the share that is done.
+    points, degree : int
+        Points that are run, and degree of the polynomials through them.
 
     Raises
     ------
@@ -82,7 +85,7 @@ def tabulate(
     check_scene(scene)
     ends = np.log([ranges[k] for k in ("pressure", "feed", "unloading_ratio", "loading_stiffness")])
     middle, half = ends.mean(axis=1), np.maximum(0.5 * np.ptp(ends, axis=1), LEAST_HALF)
-    powers = np.array([p for p in product(range(DEGREE + 1), repeat=4) if sum(p) <= DEGREE])
+    powers = np.array([p for p in product(range(degree + 1), repeat=4) if sum(p) <= degree])
     kept, rows, why = [], [], ""
     for k, place in enumerate(spread_points(points, 4)):
         if progress is not None:
