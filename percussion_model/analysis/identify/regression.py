@@ -18,12 +18,12 @@ OVER = 21  # samples of the running median
 
 
 def hardness_index(samples: Samples) -> np.ndarray:
-    """Return the logarithm of a hardness that grows as the rate, by its settings, falls.
+    """Return the logarithm of a hardness that grows as the rate at usual settings falls.
 
     A running median of the samples up to each one.
     """
     rate = np.log(samples.signals[:, RATE])
-    settings = np.log(samples.settings)
+    settings = np.log(samples.settings / np.median(samples.settings, axis=0))
     used = np.std(settings, axis=0) > CHANGES
     columns = np.column_stack([np.ones(len(rate)), settings[:, used]])
     found = np.linalg.lstsq(columns, rate, rcond=None)[0]

@@ -1,0 +1,164 @@
+"""Rock from logs: does the filter's interval hold? `python -m benchmarks.identify [HOLES]`.
+
+Holes through layers that are drawn anew, drilled by travelling waves, written as logs with noise,
+outliers, gaps and rod changes, read as the command reads them, and told by a table of modes.
+Beside it stands the usual index of hardness, with its scale from the truth of the whole hole.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from percussion_model.analysis.identify.drill import Drill, drill_of
+from percussion_model.analysis.identify.observation import Q, Table
+from percussion_model.analysis.identify.plan import ROOM
+from percussion_model.analysis.identify.prior import prior_of
+from percussion_model.analysis.identify.profile import SURE, Profile, identify
+from percussion_model.analysis.identify.regression import hardness_index
+from percussion_model.analysis.identify.synthetic import Hole, csv_text, make_hole, steps_of
+from percussion_model.interface.drill_log import read_log
+from percussion_model.scene.hammers import hammer
+
+HAMMER, ROCK = "dth5", "kuru-granite"
+# What was asked: behind a layer's top, after so much hole [m], q within so much.
+AFTER, WITHIN = 2.0, 0.1
+# Hole over which an error behind a layer is a mean [m].
+OVER = 0.15
+
+
+@dataclass(frozen=True)
+class Score:
+    """Of one hole.
+
+    Attributes
+    ----------
+    covered, covered_late : float
+        Share of samples whose interval holds the truth: of all, and of those `AFTER` a top.
+    spread : float
+        Median standard deviation of ln q there.
+    errors, index_errors : ndarray
+        Of ln q by the filter and by the usual index, `AFTER` the top of each layer; the index
+        has its scale from the truth of this hole.
+    scale : float
+        Its logarithm.
+    samples : ndarray of int
+        From there to the top.
+    layers, found : int
+        Changes that there are, and that were found.
+    told : bool
+        Whether the renewal length is said to be told.
+    """
+
+    covered: float
+    covered_late: float
+    spread: float
+    errors: np.ndarray
+    index_errors: np.ndarray
+    scale: float
+    samples: np.ndarray
+    layers: int
+    found: int
+    told: bool
+
+
+def drills() -> tuple[Drill, Drill]:
+    """Drill of the filter, by modes, and that of the truth, by waves."""
+    scene = hammer(HAMMER)
+    own = drill_of(scene.computed_by("modal"), HAMMER)
+    return own, Drill(scene.computed_by("wave"), own.pressure)
+
+
+def score(hole: Hole, found: Profile) -> Score:
+    """Compare a profile with the truth."""
+    truth = hole.truth(found.depth)
+    off = found.mean[:, Q] - truth
+    holds = np.abs(off) < SURE * found.spread[:, Q]
+    top = hole.tops[np.searchsorted(hole.tops, found.depth, side="right") - 1]
+    behind = found.depth - top
+    index = hardness_index(found.samples)
+    scale = float(np.median(index - truth))
+    index = index - scale
+    errors, others, samples = [], [], []
+    for one in hole.tops[1:]:
+        at = (top == one) & (behind > AFTER) & (behind < AFTER + OVER)
+        errors.append(np.mean(off[at]))
+        others.append(np.mean(index[at] - truth[at]))
+        samples.append(int(np.sum((top == one) & (behind <= AFTER))))
+    late = behind > AFTER
+    return Score(
+        float(holds.mean()), float(holds[late].mean()), float(np.median(found.spread[late, Q])),
+        np.array(errors), np.array(others), scale, np.array(samples), len(hole.tops) - 1,
+        len(found.layers), found.told()["renewal_length"],
+    )  # fmt: skip
+
+
+def campaign(seeds: Iterable[int], steps: bool, table: Table | None = None) -> list[Score]:
+    """Scores of holes; `steps` of rotation, pressure and feed, or one slow rotation alone."""
+    own, truth = drills()
+    prior = prior_of(own.scene, ROCK)
+    schedule = steps_of(truth)
+    if not steps:
+        schedule = schedule[1:2]
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in seeds:
+            hole = make_hole(truth, prior, schedule, seed)
+            path = Path(folder) / f"hole_{seed}.csv"
+            path.write_text(csv_text(hole), encoding="utf-8")
+            profile = identify(read_log(path), own, ROCK, table=table, room=ROOM)
+            table = profile.table
+            found.append(score(hole, profile))
+    return found
+
+
+def text(scores: list[Score]) -> str:
+    """Say what holes come to."""
+    errors = np.abs(np.concatenate([one.errors for one in scores]))
+    others = np.abs(np.concatenate([one.index_errors for one in scores]))
+    middle = np.median([one.scale for one in scores])
+    blind = np.abs(np.concatenate([one.index_errors + one.scale - middle for one in scores]))
+    samples = np.concatenate([one.samples for one in scores])
+    covered, late = (
+        100.0 * np.mean([getattr(one, name) for one in scores])
+        for name in ("covered", "covered_late")
+    )
+    return (
+        f"{len(scores)} holes, {len(errors)} layers behind others, {sum(o.found for o in scores)} "
+        f"found.\nIntervals of 95 % hold {covered:.1f} % of all samples, {late:.1f} % of those "
+        f"more than {AFTER:g} m below a top; standard deviation there "
+        f"{100 * np.median([one.spread for one in scores]):.1f} %.\n"
+        f"{AFTER:g} m below a top, {np.median(samples):.0f} samples: off by {100 * np.median(errors):.1f}"
+        f" % (median), within {100 * WITHIN:g} % in {100 * np.mean(errors < WITHIN):.0f} % of the "
+        f"layers; the usual index, with its scale from the truth of each hole: "
+        f"{100 * np.median(others):.1f} %, {100 * np.mean(others < WITHIN):.0f} %; with one scale "
+        f"for all holes: {100 * np.median(blind):.1f} %, {100 * np.mean(blind < WITHIN):.0f} %."
+        f"\nRenewal length said to be told in "
+        f"{sum(one.told for one in scores)} holes."
+    )
+
+
+def main(holes: int) -> None:
+    """Print both campaigns and the time of an hour at 1 Hz."""
+    for steps, words in ((True, "Steps of rotation, pressure, feed"), (False, "One slow rotation")):
+        print(f"{words}: {text(campaign(range(holes if steps else holes // 4), steps))}\n")
+    own, truth = drills()
+    hole = make_hole(truth, prior_of(own.scene, ROCK), steps_of(truth), 1, depth=40.0)
+    began = time.perf_counter()
+    profile = identify(hole.log, own, ROCK)
+    whole = time.perf_counter() - began
+    began = time.perf_counter()
+    identify(hole.log, own, ROCK, table=profile.table)
+    rows, again = len(hole.log.rows), time.perf_counter() - began
+    print(f"{rows} rows at 1 Hz: {whole:.1f} s, without the table {again:.1f} s, "
+          f"{1e3 * again / len(profile.depth):.2f} ms a sample")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 200)
