@@ -140,8 +140,9 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
     there = np.isfinite(depth) & np.all(np.isfinite(settings), axis=1)
     deepest = np.maximum.accumulate(np.where(np.isfinite(depth), depth, -np.inf))
     back = depth < deepest - BACK
-    usual = np.nanmedian(settings[there & new & ~back & ~off_rows], axis=0) if there.any() else 0.0
-    off = np.any(settings[:, :2] < OFF * np.asarray(usual)[..., :2], axis=-1) if there.any() else ~there
+    drills = there & new & ~back & ~off_rows
+    usual = np.median(settings[drills], axis=0) if drills.any() else np.ones(len(SETTINGS))
+    off = np.any(settings[:, :2] < OFF * usual[:2], axis=1)
     rules = (
         ("repeated", new),
         ("without depth or setting", there),

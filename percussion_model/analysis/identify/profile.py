@@ -223,13 +223,19 @@ def noise_of(samples: Samples, table: Table, prior: Prior) -> Noise:
         if len(values) < 3:
             found.append(LEAST_NOISE[k])
             continue
-        one, two = (np.median(np.abs(values[n:] - values[:-n])) for n in (1, 2))
-        sigma = one / MAD / math.sqrt(2.0)
-        # of noise that fades by r from sample to sample, differences over 2 and 1 are 1 + r
-        kept = min(max((two / max(one, 1e-9)) ** 2 - 1.0, 0.0), 0.9)
-        sigma *= math.sqrt((1.0 + kept) / (1.0 - kept)) / math.sqrt(1.0 - kept)
+        one, two = (_scatter(values[n:] - values[:-n]) for n in (1, 2))
+        # of noise that fades by r from sample to sample, differences over 2 and 1 are as 1 + r
+        kept = (two / max(one, 1e-9)) ** 2 - 1.0 - SURE / math.sqrt(len(values))
+        kept = min(max(kept, 0.0), 0.9)
+        sigma = one / math.sqrt(2.0 * (1.0 - kept)) * math.sqrt((1.0 + kept) / (1.0 - kept))
         found.append(float(np.clip(sigma, LEAST_NOISE[k], MOST_NOISE[k])))
     return Noise(*found)
+
+
+def _scatter(steps: np.ndarray) -> float:
+    """Standard deviation of differences, of which outliers and layers count as three of them."""
+    most = 3.0 * float(np.median(np.abs(steps))) / MAD
+    return float(np.sqrt(np.mean(np.minimum(np.abs(steps), most) ** 2)))
 
 
 def _along(

@@ -68,7 +68,7 @@ def identify(
     common.check_json(json_file)
     if example:
         common.refuse_existing(log, force)
-        _write_example(log, drill)
+        _write_example(log, _drill(hammer, bit, settings, "wave", pressure))
     read = read_log(log, columns)
     claimed = common.claim(
         "identify", out, Path("out") / f"{log.stem}-rock", force, log=common.digest(log),
@@ -126,7 +126,7 @@ def _drill(
 
 
 def _write_example(log: Path, drill: Drill) -> None:
-    """Write the log of a hole whose truth is drilled by waves, where the filter has modes."""
+    """Write the log of a hole that is drilled by another solver than the filter's."""
     from percussion_model.analysis.identify.prior import prior_of
     from percussion_model.analysis.identify.synthetic import csv_text, make_hole, steps_of
     from percussion_model.analysis.identify.tabulate import IdentifyError
@@ -135,9 +135,9 @@ def _write_example(log: Path, drill: Drill) -> None:
     if drill.pressure is None:
         raise IdentifyError("--example: give the hammer's pressure by --pressure")
     common.tell_of_compiling("wave")
-    truth = type(drill)(drill.scene.computed_by("wave"), drill.pressure)
+    prior = prior_of(drill.scene, "kuru-granite")
     with progress("drilling the example"):
-        hole = make_hole(truth, prior_of(truth.scene, "kuru-granite"), steps_of(drill), seed=3)
+        hole = make_hole(drill, prior, steps_of(drill), seed=3)
     common.list_files([common.write_file(log, csv_text(hole))])
 
 
