@@ -50,7 +50,8 @@ CASES: dict[str, dict[str, float | bool]] = {
 FATIGUE = 5.0
 SIGNALS = (
     "hammer.bit.force_peak", "hammer.blow_count", "hammer.bit.position", "supply.energy",
-    "filter.apparent_energy", "filter.apparent_energy_low", "filter.apparent_energy_high", "controller.mode",
+    "filter.apparent_energy", "filter.apparent_energy_low", "filter.apparent_energy_high",
+    "controller.mode",
     "supply.supply_pressure", "string.feed_force_mean", "rock.crushing_energy", "filter.layers",
 )  # fmt: skip
 SHOWN = {

@@ -210,5 +210,7 @@ def test_the_command_ends_in_that_line(tmp_path, capsys):
     path.write_text(REFUSED["a word"][0], encoding="utf-8")
     words = ("--hammer", "dth5", "--out", tmp_path / "out")
     assert percussion("identify", path, *words) == 2
-    assert "row 6, column 3 (rate): 'fast' is no number" in capsys.readouterr().err.replace("\n", " ")
+    assert "row 6, column 3 (rate): 'fast' is no number" in capsys.readouterr().err.replace(
+        "\n", " "
+    )
     assert not (tmp_path / "out").exists()

@@ -31,6 +31,8 @@ def do(page, folder):
             name = re.match(r"# (\w+\.py)\n", text)[1]
             (folder / name).write_text(text, encoding="utf-8")
             continue
+        if language == "toml":  # of files that a reader may need
+            continue
         assert language == "sh", language
         for line in text.splitlines():
             if line.startswith(("pip install", *LONG)):

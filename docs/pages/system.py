@@ -33,8 +33,8 @@ def variables() -> str:
 
 
 def _repeated(name: str) -> bool:
-    """Whether it is a parameter of a layer after the first, which reads like the first."""
-    return name.startswith("layers[") and not name.startswith("layers[1]")
+    """Whether it is one of a row after the first, which reads like the first, as of layers."""
+    return "[" in name and "[1]" not in name
 
 
 def _cells(one: Variable) -> tuple[str, ...]:

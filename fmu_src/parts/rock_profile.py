@@ -45,7 +45,7 @@ class RockProfile(Model):
     def _layer(self, number: int) -> tuple[float, float, float, float, float, int]:
         """Top [m], K_R [N/m], gamma, torque factor, e_c [J/m^3] and number of a layer."""
         top, *numbers = (self.parameters[f"layers[{number}].{name}"] for name in _LAYER)
-        return top, *numbers, number  # type: ignore[return-value]
+        return top, *numbers, number
 
     def begin(self, inputs: dict[str, Any]) -> None:
         """Look at the rock below the bit."""

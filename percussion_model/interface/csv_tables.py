@@ -77,6 +77,7 @@ def factor_of(unit: str | None, si: str, where: str) -> float:
 
 
 def plain_unit(unit: str) -> str:
+    """Return a unit without brackets, and with a plain letter for micro."""
     return unit.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
 
 

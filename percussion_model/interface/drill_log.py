@@ -54,7 +54,8 @@ NAMES = {
     "feed": ("feed", "feed force", "thrust", "thrust force", "weight on bit", "wob"),
     "feed_pressure": ("feed pressure", "feeder pressure", "thrust pressure", "feed press", "fp"),
     "speed": (
-        "speed", "rotation speed", "rotary speed", "rotation rate", "rotation", "rpm", "rotation rpm",
+        "speed", "rotation speed", "rotary speed", "rotation rate", "rotation", "rpm",
+        "rotation rpm",
     ),
     "frequency": ("frequency", "blow frequency", "percussion frequency", "impact frequency", "bpm"),
     "torque": ("torque", "rotation torque"),
@@ -67,7 +68,9 @@ SAID = {"rpm": "rpm", "rotation rpm": "rpm", "bpm": "1/min"}
 # Words and numbers of loggers for a value that is missing.
 MISSING = frozenset(("", "nan", "null", "none", "-", "--", "n/a", "#n/a", "na", "inf", "-inf"))
 SENTINELS = frozenset((-999.0, -999.25, -9999.0, -99999.0))
-_CLOCK = re.compile(r"(?:(?P<date>\S+)[ T])?(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d+)?))?Z?")
+_CLOCK = re.compile(
+    r"(?:(?P<date>\S+)[ T])?(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d+)?))?Z?"
+)
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%Y/%m/%d")
 DAY = 86400.0
 _WANTED = "rate is wanted, or depth and time; and pressure, feed, rpm, torque as far as there are"
@@ -104,7 +107,8 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
     lines = read_lines(path)
     number, separator, titles = _heading(path, lines, given)
     columns = _columns(path, number, titles, given, mapping)
-    table, cut, again = [], 0, 0
+    table: list[tuple[int, list[str]]] = []
+    cut = again = 0
     for at, line in enumerate(lines[number:], number + 1):
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
@@ -131,7 +135,9 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
         raise IdentifyError(f"{path}: row {number}, column 1: no row of numbers is behind it")
     notes = [f"{cut} rows are cut off; left out"] * bool(cut)
     notes += [f"{again} rows repeat the heading; left out"] * bool(again)
-    found = {one.name: _values(path, one, number, titles, table, separator, notes) for one in columns}
+    found = {
+        one.name: _values(path, one, number, titles, table, separator, notes) for one in columns
+    }
     if "rate" not in found and not {"depth", "time"} <= found.keys():
         raise IdentifyError(
             f"{path}: row {number}, column 1: found {', '.join(found)} alone: {_WANTED}"
@@ -274,9 +280,8 @@ def _values(
     lost = int(np.isnan(numbers).sum())
     if lost:
         notes.append(f"{one.name}: {lost} of {len(table)} cells have no value")
-    if one.name == "time":
-        if any(_CLOCK.fullmatch(cells[one.place]) for _, cells in table):
-            return _over_midnight(numbers)
+    if one.name == "time" and any(_CLOCK.fullmatch(cells[one.place]) for _, cells in table):
+        return _over_midnight(numbers)
     unit = one.unit or USUAL.get(one.name)
     if unit is None:
         raise IdentifyError(
@@ -300,9 +305,9 @@ def _number(path: Path, one: _Column, row: tuple[int, list[str]], separator: str
     word = row[1][one.place]
     if word.lower() in MISSING or set(word) == {"*"}:
         return float("nan")
-    if one.name == "time" and (clock := _CLOCK.fullmatch(word)):
-        if (seconds := _seconds(clock)) is not None:
-            return seconds
+    clock = _CLOCK.fullmatch(word) if one.name == "time" else None
+    if clock and (seconds := _seconds(clock)) is not None:
+        return seconds
     value = finite(word if separator == "," else word.replace(",", "."))
     if value is None:
         comma = ": commas separate the columns" if "," in word and separator == "," else ""

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from percussion_model.analysis.identify.observation import (
-    SIGNALS,
-    UNKNOWNS,
-)
+from percussion_model.analysis.identify.drill import Drill
+from percussion_model.analysis.identify.observation import SIGNALS, UNKNOWNS
+from percussion_model.analysis.identify.part import to_numbers
 from percussion_model.analysis.identify.plan import Change
-from percussion_model.analysis.identify.profile import Profile
+from percussion_model.analysis.identify.profile import Profile, part_filter
 from percussion_model.simulation.files import staged
 
 MEGA = 1e-6
@@ -50,7 +49,8 @@ def layer_rows(found: Profile) -> list[tuple[str, ...]]:
 
 def unknown_rows(found: Profile) -> list[tuple[str, ...]]:
     """Rows of the unknowns behind the last sample, and whether the log tells them."""
-    told, rows = found.told(), []
+    told = found.told()
+    rows: list[tuple[str, ...]] = []
     for k, name in enumerate(UNKNOWNS):
         words, unit, factor = WORDS[name]
         low, value, high = (factor * one[-1] for one in found.interval(k))
@@ -90,7 +90,7 @@ def notes(found: Profile) -> list[str]:
 
 def plan_rows(changes: Sequence[Change]) -> list[tuple[str, ...]]:
     """Rows of changes, the best first."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for one in changes:
         words = "go on as now"
         if one.setting:
@@ -136,17 +136,29 @@ def csv_text(found: Profile, every: float) -> str:
     return "\n".join(lines) + "\n"
 
 
+def part_text(found: Profile, drill: Drill) -> str:
+    """Return parameters of the part RockFilter, as a system's file has them."""
+    numbers = to_numbers(part_filter(found, drill))
+    return "[parameters.filter]\n" + "".join(f'"{k}" = {v:.9g}\n' for k, v in numbers.items())
+
+
 def write_pages(
     found: Profile, folder: Path, name: str, hammer: str, every: float, changes: Sequence[Change]
 ) -> list[Path]:
     """Write table, figure and report into a folder, all or none."""
+    from matplotlib import rc_context
+
     from percussion_model.interface.pages import filled
     from percussion_model.interface.plotting import style
     from percussion_model.interface.plotting.rock_profile import draw_profile
 
     tables: list[Table] = [
         ("Layers", LAYER_HEADS, layer_rows(found)),
-        ("What the log tells", ("behind the last sample", "value", "95 %", ""), unknown_rows(found)),
+        (
+            "What the log tells",
+            ("behind the last sample", "value", "95 %", ""),
+            unknown_rows(found),
+        ),
         ("Rows", ("rule", "rows"), count_rows(found)),
     ]
     if changes:
@@ -154,7 +166,7 @@ def write_pages(
         tables.insert(0, ("The next metre", heads, plan_rows(changes)))
     with staged(folder) as draft:
         (draft / "rock.csv").write_text(csv_text(found, every), encoding="utf-8")
-        with style.rc_context(style.STYLE):
+        with rc_context(style.STYLE):
             figure = draw_profile(found, f"Rock of {name}")
             picture = style.save_png(figure, draft / "rock.png", 110)
         page = filled(

@@ -20,12 +20,12 @@ import numpy as np
 
 from percussion_model.analysis.identify.observation import (
     FRICTION,
-    Q,
     RATE,
     RENEWAL,
     SIGNALS,
     THRESHOLD,
     UNKNOWNS,
+    Q,
     Table,
 )
 
@@ -224,7 +224,9 @@ class RockFilter:
         unknowns = np.repeat(points, many, axis=0)
         return self.table.predict(unknowns, np.tile(settings, (count, 1))).reshape(count, -1)
 
-    def _go(self, move: np.ndarray, measured: np.ndarray, noise: np.ndarray, at: np.ndarray) -> None:
+    def _go(
+        self, move: np.ndarray, measured: np.ndarray, noise: np.ndarray, at: np.ndarray
+    ) -> None:
         """Go the most likely part of a way, or to the q that the rates tell with all else as it is.
 
         Where hardly anything breaks, slopes lead astray.

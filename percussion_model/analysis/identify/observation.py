@@ -13,8 +13,7 @@ rate tells q alone; the motion does not know of it.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,20 +65,6 @@ class Table:
     buttons: float
     exponent: float
 
-    def plain(self) -> dict[str, Any]:
-        """Return plain values, which `Table.of` takes back."""
-        return {
-            key: one.tolist() if isinstance(one, np.ndarray) else one
-            for key, one in asdict(self).items()
-        }
-
-    @classmethod
-    def of(cls, values: dict[str, Any]) -> Table:
-        """Return the table of plain values."""
-        return cls(
-            **{key: np.array(one) if isinstance(one, list) else one for key, one in values.items()}
-        )
-
     def contains(self, settings: np.ndarray) -> np.ndarray:
         """Whether pressure and feed of settings, shape (n, 3), are in the table."""
         off = np.abs((np.log(settings[:, :2]) - self.middle[:2]) / self.half[:2])
@@ -123,9 +108,7 @@ class Table:
         crushed, blows, work, force, rubbing = np.exp(rows)
         speed = settings[:, 2]
         turns = self.radius * speed / (blows * np.exp(unknowns[:, RENEWAL]))
-        known = np.maximum(
-            crushed * np.exp(-turns), self.buttons * np.exp(unknowns[:, THRESHOLD])
-        )
+        known = np.maximum(crushed * np.exp(-turns), self.buttons * np.exp(unknowns[:, THRESHOLD]))
         beyond = np.maximum(crushed - known, LEAST * crushed)
         gained = np.minimum(beyond * np.exp(-unknowns[:, Q]) / self.area, work / force)
         fresh = 1.0 - np.exp(-turns / (self.exponent + 1.0))

@@ -15,7 +15,7 @@ from percussion_model.analysis.identify.observation import (
 )
 
 # Polynomials of a part's table, and the axes and rows that it has.
-DEGREE = 2
+DEGREE, POINTS = 2, 60
 AXES = ("pressure", "feed", "unloading_ratio", "loading_stiffness")
 ROWS = ("crushed_energy", "blow_frequency", "work", "force", "rubbing")
 POWERS = np.array([p for p in product(range(DEGREE + 1), repeat=len(AXES)) if sum(p) <= DEGREE])
@@ -52,6 +52,4 @@ def from_numbers(values: Mapping[str, float]) -> RockFilter:
         values["buttons"], values["loading_exponent"],
     )  # fmt: skip
     noise = Noise(*several("noise.{}", SIGNALS).tolist())
-    return RockFilter(
-        table, several("prior.{}", UNKNOWNS), several("spread.{}", UNKNOWNS), noise
-    )
+    return RockFilter(table, several("prior.{}", UNKNOWNS), several("spread.{}", UNKNOWNS), noise)

@@ -11,11 +11,11 @@ import numpy as np
 
 from percussion_model.analysis.identify.filter import ALIKE, VARIES
 from percussion_model.analysis.identify.observation import (
-    Q,
     RATE,
     SETTINGS,
     SIGNALS,
     UNKNOWNS,
+    Q,
     Table,
 )
 from percussion_model.analysis.identify.profile import SURE, Profile

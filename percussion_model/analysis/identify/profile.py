@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,14 @@ from percussion_model.analysis.identify.drill import Drill
 from percussion_model.analysis.identify.filter import Noise, RockFilter
 from percussion_model.analysis.identify.observation import (
     GAMMA,
-    Q,
     RATE,
     SIGNALS,
     STIFFNESS,
     UNKNOWNS,
+    Q,
     Table,
 )
+from percussion_model.analysis.identify.part import AXES, DEGREE, POINTS
 from percussion_model.analysis.identify.prior import WITHIN, Prior, prior_of
 from percussion_model.analysis.identify.tabulate import REACH, IdentifyError, tabulate
 from percussion_model.scene.rocks.breaking import (
@@ -117,7 +119,7 @@ class Profile:
         low, value, high = self.interval()
         ends = [float(self.depth[0]), *self.layers, float(self.depth[-1])]
         found = []
-        for top, bottom in zip(ends[:-1], ends[1:], strict=True):
+        for top, bottom in pairwise(ends):
             k = max(int(np.searchsorted(self.depth, bottom)) - 1, 0)
             strength = [float(one[k]) for one in self.strength()]
             found.append(
@@ -195,6 +197,15 @@ def identify(
     return _along(samples, found, prior, noise, scene, tell)
 
 
+def part_filter(profile: Profile, drill: Drill) -> RockFilter:
+    """Return a filter for a part, whose table reaches as far as that of a profile."""
+    middle, half = profile.table.middle, profile.table.half
+    ends = zip(np.exp(middle - half).tolist(), np.exp(middle + half).tolist(), strict=True)
+    ranges = dict(zip(AXES, ends, strict=True))
+    table = tabulate(drill.scene, drill.changes, ranges, points=POINTS, degree=DEGREE)
+    return RockFilter(table, profile.prior.mean, profile.prior.spread, profile.noise)
+
+
 def _ranges(
     samples: Samples, prior: Prior, room: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
@@ -227,6 +238,7 @@ def noise_of(samples: Samples, table: Table, prior: Prior) -> Noise:
         # of noise that fades by r from sample to sample, differences over 2 and 1 are as 1 + r
         kept = (two / max(one, 1e-9)) ** 2 - 1.0 - SURE / math.sqrt(len(values))
         kept = min(max(kept, 0.0), 0.9)
+        one = float(np.median(np.abs(np.diff(values)))) / MAD  # which outliers hardly move
         sigma = one / math.sqrt(2.0 * (1.0 - kept)) * math.sqrt((1.0 + kept) / (1.0 - kept))
         found.append(float(np.clip(sigma, LEAST_NOISE[k], MOST_NOISE[k])))
     return Noise(*found)

@@ -15,11 +15,11 @@ from percussion_model.analysis.identify.drill import Drill
 from percussion_model.analysis.identify.observation import (
     FRICTION,
     GAMMA,
-    Q,
     RENEWAL,
     STIFFNESS,
     THRESHOLD,
     UNKNOWNS,
+    Q,
 )
 from percussion_model.analysis.identify.prior import KEYS, Prior
 from percussion_model.analysis.identify.tabulate import ETA, IdentifyError

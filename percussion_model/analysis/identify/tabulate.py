@@ -13,7 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.identify.observation import Table, basis
+from percussion_model.analysis.identify.observation import (
+    BLOWS,
+    RUBBING,
+    WORK,
+    Table,
+    basis,
+)
 from percussion_model.analysis.stationary import settled
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
@@ -103,9 +109,11 @@ def tabulate(
         )
     x, y = basis(np.array(kept), powers), np.array(rows)
     terms, left_out = _fit(x, y)
-    crushed, blows, work, force, rubbing = left_out.T
-    rate = _spread(crushed + blows)
-    errors = np.array([rate, _spread(blows), _spread(0.5 * (work + rubbing) + blows * 0.5)])
+    crushed, blows, work, _, rubbing = left_out.T
+    climbing = np.exp(y[:, WORK] + y[:, BLOWS]) / scene["rotation.speed"]
+    share = climbing / (climbing + scene["rotation.friction"] * np.exp(y[:, RUBBING]))
+    torque = share * (work + blows) + (1.0 - share) * rubbing
+    errors = np.array([_spread(one) for one in (crushed + blows, blows, torque)])
     return Table(
         middle, half, powers, terms.T, errors, hole_area(scene), scene["rotation.mean_radius"],
         float(scene["breaking.buttons"]), _exponent(scene),

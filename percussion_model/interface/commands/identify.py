@@ -36,18 +36,22 @@ def identify(
         float | None,
         common.number_option("--pressure", "PRESSURE", "pneumatic.supply_pressure", _PRESSURE),
     ] = None,
-    every: Annotated[
-        float, common.number_option("--every", "LENGTH", "start.depth", _EVERY)
-    ] = 0.1,
+    every: Annotated[float, common.number_option("--every", "LENGTH", "start.depth", _EVERY)] = 0.1,
     collaring: Annotated[
         float, common.number_option("--collaring", "LENGTH", "start.depth", _COLLARING)
     ] = 0.5,
     plan: Annotated[
         bool, typer.Option("--plan", help="Tell which change in the next metre would tell most.")
     ] = False,
+    part: Annotated[
+        Path | None,
+        typer.Option("--part", metavar="TOML", help="Write parameters of the part RockFilter."),
+    ] = None,
     example: Annotated[
         bool,
-        typer.Option("--example", help="Write LOG first: a hole through layers, of travelling waves."),
+        typer.Option(
+            "--example", help="Write LOG first: a hole through layers, of travelling waves."
+        ),
     ] = False,
     settings: common.Settings = None,
     solver: common.SolverName = None,
@@ -66,6 +70,7 @@ def identify(
         raise common.refusal(f"--every {every:g}: must be above 0 m")
     drill = _drill(hammer, bit, settings, solver, pressure)
     common.check_json(json_file)
+    common.check_file("--part", part)
     if example:
         common.refuse_existing(log, force)
         _write_example(log, _drill(hammer, bit, settings, "wave", pressure))
@@ -91,6 +96,9 @@ def identify(
     common.write_json(json_file, summary)
     from percussion_model.interface import identify_text
 
+    if part is not None:
+        text = identify_text.part_text(found, drill.at_pressure_of(read)[0])
+        common.list_files([common.write_file(part, text)])
     if json_file != "-":
         _show(found)
         if changes:
