@@ -129,17 +129,19 @@ def text(scores: list[Score]) -> str:
         100.0 * np.mean([getattr(one, name) for one in scores])
         for name in ("covered", "covered_late")
     )
+    shares = {
+        words: f"{100 * np.median(off):.1f} % (median), within {100 * WITHIN:g} % in "
+        f"{100 * np.mean(off < WITHIN):.0f} % of the layers"
+        for words, off in (("filter", errors), ("own", others), ("one", blind))
+    }
     return (
         f"{len(scores)} holes, {len(errors)} layers behind others, {sum(o.found for o in scores)} "
         f"found.\nIntervals of 95 % hold {covered:.1f} % of all samples, {late:.1f} % of those "
         f"more than {AFTER:g} m below a top; standard deviation there "
         f"{100 * np.median([one.spread for one in scores]):.1f} %.\n"
-        f"{AFTER:g} m below a top, {np.median(samples):.0f} samples: off by "
-        f"{100 * np.median(errors):.1f} % (median), within {100 * WITHIN:g} % in "
-        f"{100 * np.mean(errors < WITHIN):.0f} % of the layers; the usual index, with its scale from the truth of each hole: "
-        f"{100 * np.median(others):.1f} %, {100 * np.mean(others < WITHIN):.0f} %; with one scale "
-        f"for all holes: {100 * np.median(blind):.1f} %, {100 * np.mean(blind < WITHIN):.0f} %."
-        f"\nRenewal length said to be told in "
+        f"{AFTER:g} m below a top, {np.median(samples):.0f} samples, off by {shares['filter']}.\n"
+        f"The usual index, with its scale from the truth of each hole: {shares['own']}; with one "
+        f"scale for all holes: {shares['one']}.\nRenewal length said to be told in "
         f"{sum(one.told for one in scores)} holes."
     )
 

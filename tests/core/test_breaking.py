@@ -53,6 +53,7 @@ def make(**changes):
         par["power"], par["cuttings"], par["left"] = 1, Cuttings.INDEXED, 1
     s["mode"], s["k_r"], s["next_k_r"], s["gamma"], s["next_gamma"] = Mode.FF, K, K, GAMMA, GAMMA
     s["rotation_speed"] = s["rotation_turning_speed"] = SPEED
+    s["breaking_crushing_energy"] = par["breaking_crushing_energy"]
     s["feed"] = 3000.0
     return par, s
 
