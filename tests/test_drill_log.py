@@ -110,6 +110,8 @@ CLEANED = {
     "no advance": (stepped(80, ["0"] * 4, 2), "no advance: 4"),
     "a clock set back": (stepped(80, [f"{k}" for k in range(40)], 0), "time: set back 1 times"),
     "a gap in time": (stepped(80, [f"{k}" for k in range(500, 540)], 0), "run-in behind a stop"),
+    "a leap of the depth": (stepped(80, ["9.9"] * 5, 1), "depth leaps away and comes back: 5"),
+    "depth negative downwards": (stepped(0, [f"-{row[1]}" for row in rows()], 1), "downwards"),
     "no rate": (without(2), "rate: none in the log; depth over time"),
     "no depth": (without(1), "depth: none in the log"),
     "no rotation": (without(5), "speed: none in the log; the hammer's, 5.7 rad/s"),
@@ -168,6 +170,25 @@ def test_a_clock_goes_on_behind_midnight(tmp_path):
         row[0] = f"{second // 3600 % 24:02d}:{second // 60 % 60:02d}:{second % 60:02d}"
     path.write_text(text_of(table), encoding="utf-8")
     assert np.diff(read_log(path).columns["time"]) == pytest.approx(1.0)
+
+
+def test_headings_of_rigs_are_known(tmp_path):
+    """Words run together, what says that it is a mean, lines of a header, and units below."""
+    path = tmp_path / "log.txt"
+    head = ["Datum", "Depth", "RateOfPenetration", "avePercPressure", "PressurePulldown"]
+    lines = ["[HEADER]", "ID=7", "", ";".join(head), "0;m;cm/min;bar;bar", "[DATA]",
+             *(f"03.11.2023 12:30:{k:02d};-{k / 100};60;24;90" for k in range(60))]  # fmt: skip
+    path.write_text("\n".join(lines), encoding="utf-8")
+    found = read_log(path)
+    assert set(found.columns) == {"time", "depth", "rate", "pressure", "feed_pressure"}
+    assert found.columns["rate"] == pytest.approx(0.01)
+    assert found.columns["pressure"] == pytest.approx(24e5)
+    assert np.diff(found.columns["time"]) == pytest.approx(1.0)
+    head[3] = "MWD Sample Percussion Pressure (Avg)"
+    lines[3:5] = [";".join(head), "0;m;cm/min;;bar"]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(IdentifyError, match=r"row 4, column 4, .*has no unit"):
+        read_log(path)
 
 
 def test_a_mapping_names_columns_and_gives_areas(tmp_path):

@@ -38,28 +38,36 @@ from percussion_model.scene.text import read_toml
 
 # What rigs call their columns, in small letters; the first is our own name.
 NAMES = {
-    "time": ("time", "timestamp", "time stamp", "datetime", "date time", "elapsed time", "clock"),
+    "time": (
+        "time", "timestamp", "time stamp", "datetime", "date time", "elapsed time", "clock",
+        "datum",
+    ),
     "depth": (
         "depth", "hole depth", "hole length", "bit depth", "drilled depth", "drilled length",
         "length", "measured depth", "md",
     ),
     "rate": (
         "rate", "rop", "penetration rate", "rate of penetration", "penetration speed",
-        "penetr rate", "drilling rate", "drill rate", "pr",
+        "penetr rate", "penetr speed", "pen rate", "drilling rate", "drill rate", "pr",
     ),
     "pressure": (
         "pressure", "percussion pressure", "percussive pressure", "hammer pressure",
-        "impact pressure", "supply pressure", "air pressure", "perc press", "hp",
+        "impact pressure", "supply pressure", "air pressure", "perc press", "perc pressure", "hp",
     ),
     "feed": ("feed", "feed force", "thrust", "thrust force", "weight on bit", "wob"),
-    "feed_pressure": ("feed pressure", "feeder pressure", "thrust pressure", "feed press", "fp"),
+    "feed_pressure": (
+        "feed pressure", "feeder pressure", "thrust pressure", "feed press", "fp",
+        "pulldown pressure", "pressure pulldown",
+    ),
     "speed": (
         "speed", "rotation speed", "rotary speed", "rotation rate", "rotation", "rpm",
         "rotation rpm",
     ),
     "frequency": ("frequency", "blow frequency", "percussion frequency", "impact frequency", "bpm"),
     "torque": ("torque", "rotation torque"),
-    "rotation_pressure": ("rotation pressure", "rotary pressure", "torque pressure", "rp"),
+    "rotation_pressure": (
+        "rotation pressure", "rotary pressure", "torque pressure", "rot pressure", "rp",
+    ),
 }  # fmt: skip
 _OWN = {word: name for name, words in NAMES.items() for word in words}
 # Columns whose numbers are in these units where none is told.
@@ -68,6 +76,7 @@ SAID = {"rpm": "rpm", "rotation rpm": "rpm", "bpm": "1/min"}
 # Words and numbers of loggers for a value that is missing.
 MISSING = frozenset(("", "nan", "null", "none", "-", "--", "n/a", "#n/a", "na", "inf", "-inf"))
 SENTINELS = frozenset((-999.0, -999.25, -9999.0, -99999.0))
+_MEAN = frozenset(("avg", "ave", "average", "mean", "mwd", "sample"))
 _CLOCK = re.compile(
     r"(?:(?P<date>\S+)[ T])?(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d+)?))?Z?"
 )
@@ -119,7 +128,7 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
             continue
         if cells == titles:
             again += 1
-        elif not table and not cut and has_no_number(cells) and any(map(_is_unit, cells)):
+        elif not table and not cut and _is_of_units(cells):
             columns = [_with_unit(one, cells) for one in columns]
         elif len(cells) > len(titles):
             hint = "; a decimal comma needs another separator" if separator == "," else ""
@@ -168,7 +177,9 @@ def _read_mapping(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def _key(title: str) -> str:
-    return re.sub(r"[\s_.]+", " ", title).strip().lower()
+    """A heading in small letters, its words apart, without what says that it is a mean."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])|[\s_.]+", " ", title).lower().split()
+    return " ".join(word for word in words if word not in _MEAN)
 
 
 def _name_and_unit(title: str) -> tuple[str, str | None] | None:
@@ -178,6 +189,7 @@ def _name_and_unit(title: str) -> tuple[str, str | None] | None:
         if parts and (name := _OWN.get(_key(parts["name"]))):
             if pattern is HEADING:
                 unit = parts["bracketed"] or parts["behind"] or parts["said"]
+                unit = None if unit and unit.lower() in _MEAN else unit
             else:
                 unit = parts["unit"]
                 if plain_unit(unit) not in UNITS[COLUMNS[name]]:
@@ -256,8 +268,9 @@ def _unit_of(title: str) -> str | None:
     return (parts["bracketed"] or parts["behind"] or parts["said"]) if parts else None
 
 
-def _is_unit(cell: str) -> bool:
-    return any(plain_unit(cell) in units for units in UNITS.values())
+def _is_of_units(cells: Sequence[str]) -> bool:
+    units = sum(any(plain_unit(cell) in known for known in UNITS.values()) for cell in cells)
+    return units > 1 or (units == 1 and has_no_number(cells))
 
 
 def _with_unit(one: _Column, cells: Sequence[str]) -> _Column:

@@ -16,6 +16,8 @@ COLUMNS = {
 }  # fmt: skip
 # The bit is back by so much: a rod change, or a retraction [m].
 BACK = 0.05
+# A leap down by more in one row [m] is a fault where the depth comes back in so many rows.
+DEEPER, SOON = 0.5, 60
 # Hole that is left out at its collar, and behind each stop [m].
 COLLARING, RUN_IN = 0.5, 0.05
 # Less of what is usual in the log: percussion or feed is off.
@@ -116,6 +118,9 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
     if depth is None:
         depth = np.cumsum(np.nan_to_num(rate * _steps(columns["time"])))
         notes.append("depth: none in the log; the sum of rate and time")
+    elif -np.nanmin(depth, initial=0.0) > np.nanmax(depth, initial=0.0):
+        depth = -depth
+        notes.append("depth: counted negative downwards in the log; turned")
     settings = np.stack([_setting(columns, name, own, total, notes) for name in SETTINGS], axis=1)
     signals = np.full((total, len(SIGNALS)), np.nan)
     for k, (name, most) in enumerate(zip(SIGNALS, MOST, strict=True)):
@@ -138,14 +143,16 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
         if resets:
             notes.append(f"time: set back {resets} times; the depth tells the order")
     there = np.isfinite(depth) & np.all(np.isfinite(settings), axis=1)
-    deepest = np.maximum.accumulate(np.where(np.isfinite(depth), depth, -np.inf))
+    leaps = _leaps(depth)
+    deepest = np.maximum.accumulate(np.where(np.isfinite(depth) & ~leaps, depth, -np.inf))
     back = depth < deepest - BACK
-    drills = there & new & ~back & ~off_rows
+    drills = there & new & ~leaps & ~back & ~off_rows
     usual = np.median(settings[drills], axis=0) if drills.any() else np.ones(len(SETTINGS))
     off = np.any(settings[:, :2] < OFF * usual[:2], axis=1)
     rules = (
         ("repeated", new),
         ("without depth or setting", there),
+        ("depth leaps away and comes back", ~leaps),
         ("bit back: rod changes, retraction", ~back),
         ("percussion or feed off", ~off),
         ("no advance", ~off_rows),
@@ -163,6 +170,17 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
             f"{log.name}: {len(found.depth)} of {total} rows are left, at least {FEWEST} are "
             f"wanted; left out: {told or 'none'}"
         )
+    return found
+
+
+def _leaps(depth: np.ndarray) -> np.ndarray:
+    """Whether a depth is a fault: a leap down in one row, from which it comes back soon."""
+    found = np.zeros(len(depth), bool)
+    down = np.flatnonzero(np.diff(depth) > DEEPER)
+    for k in down:
+        back = np.flatnonzero(depth[k + 1 : k + 1 + SOON] < depth[k] + DEEPER)
+        if len(back):
+            found[k + 1 : k + 1 + back[0]] = True
     return found
 
 
