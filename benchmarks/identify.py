@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.hardness_index import hardness_index
+from docs.blocks import DOCS, publish
 from percussion_model.analysis.identify.drill import Drill, drill_of
 from percussion_model.analysis.identify.observation import Q, Table
 from percussion_model.analysis.identify.plan import ROOM
 from percussion_model.analysis.identify.prior import prior_of
 from percussion_model.analysis.identify.profile import SURE, Profile, identify
-from percussion_model.analysis.identify.regression import hardness_index
 from percussion_model.analysis.identify.synthetic import Hole, csv_text, make_hole, steps_of
 from percussion_model.interface.drill_log import read_log
 from percussion_model.scene.hammers import hammer
@@ -29,6 +30,8 @@ from percussion_model.scene.hammers import hammer
 HAMMER, ROCK = "dth5", "kuru-granite"
 # What was asked: behind a layer's top, after so much hole [m], q within so much.
 AFTER, WITHIN = 2.0, 0.1
+# So many holes are told in this page.
+PUBLISHED, PAGE = 200, DOCS / "tutorials" / "rock_from_a_log.md"
 # Hole over which an error behind a layer is a mean [m].
 OVER = 0.15
 
@@ -148,8 +151,14 @@ def text(scores: list[Score]) -> str:
 
 def main(holes: int) -> None:
     """Print both campaigns and the time of an hour at 1 Hz."""
-    for steps, words in ((True, "Steps of rotation, pressure, feed"), (False, "One slow rotation")):
-        print(f"{words}: {text(campaign(range(holes if steps else holes // 4), steps))}\n")
+    kinds = (("Steps of rotation, pressure, feed", True), ("One slow rotation", False))
+    told = "\n\n".join(
+        f"**{words}**: {text(campaign(range(holes if steps else holes // 4), steps))}"
+        for words, steps in kinds
+    )
+    print(told)
+    if holes >= PUBLISHED:
+        publish({"holes": told}, PAGE)
     own, truth = drills()
     hole = make_hole(truth, prior_of(own.scene, ROCK), steps_of(truth), 1, depth=40.0)
     began = time.perf_counter()

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks import identify as campaign
+from benchmarks.hardness_index import hardness_index
 from percussion_model.analysis.identify.cleaning import clean
 from percussion_model.analysis.identify.drill import drill_of
 from percussion_model.analysis.identify.filter import VARIES, Noise, RockFilter
@@ -33,7 +34,6 @@ from percussion_model.analysis.identify.profile import (
     noise_of,
     strength_by_energy,
 )
-from percussion_model.analysis.identify.regression import hardness_index
 from percussion_model.analysis.identify.synthetic import LAG, make_hole, steps_of
 from percussion_model.analysis.identify.tabulate import (
     IdentifyError,

@@ -34,11 +34,6 @@ class Prior:
     spread: np.ndarray
     rock: str | None
 
-    def interval(self, which: int) -> tuple[float, float]:
-        """Where nine tenths lie."""
-        off = 0.5 * WITHIN * self.spread[which]
-        return math.exp(self.mean[which] - off), math.exp(self.mean[which] + off)
-
 
 def prior_of(scene: Scene, name: str | None = None) -> Prior:
     """Return the prior of a rock under the bit of a scene.

@@ -23,7 +23,6 @@ from percussion_model.analysis.identify.drill import Drill
 from percussion_model.analysis.identify.filter import Noise, RockFilter
 from percussion_model.analysis.identify.observation import (
     GAMMA,
-    RATE,
     SIGNALS,
     STIFFNESS,
     UNKNOWNS,
@@ -278,9 +277,3 @@ def _along(
     return Profile(
         samples.depth, mean, spread, layers, samples, found.table, prior, noise, worn, found.p
     )
-
-
-def rate_error(profile: Profile) -> np.ndarray:
-    """Logarithms of the measured rates by those of the filter, of each sample."""
-    expected = profile.table.predict(profile.mean, profile.samples.settings)[:, RATE]
-    return np.log(profile.samples.signals[:, RATE]) - expected
