@@ -12,6 +12,7 @@ from fmu_src.parts.part import form_fault
 from fmu_src.parts.rock_filter import TABLE, RockFilter
 from fmu_src.parts.rock_profile import TABLE as ROCK
 from fmu_src.parts.rock_profile import RockProfile
+from fmu_src.system.archive import build_fmus, read_plan, write_system
 from percussion_model import Simulation, SimulationError
 from percussion_model.analysis.identify.observation import Q
 from percussion_model.analysis.identify.part import from_numbers
@@ -109,6 +110,23 @@ def test_the_system_has_the_numbers_of_its_hammer():
     found = rock_following.numbers()
     told = {name: NUMBERS[name] for name in found}
     assert found == pytest.approx(told, rel=1e-4, abs=1e-4)
+
+
+def test_in_its_system_it_tells_the_rock_and_the_pressure_follows(built_library, tmp_path):
+    """Coupled with hammer, string, rig, supply and controller, through one change of rock."""
+    plan = read_plan(rock_following.SYSTEM)
+    archive = write_system(plan, build_fmus(plan, tmp_path), tmp_path / "system.ssp")
+    found = rock_following.run(archive, {"rock.layers[2].top": 0.08}, 16.0)
+    rock = found["rock.crushing_energy"] / plan.parameters["hammer"]["breaking.efficiency"]
+    depth, time = found["hammer.bit.position"], found["time"]
+    for at in (np.searchsorted(depth, 0.075), len(time) - 1):
+        low, high = (found[f"filter.apparent_energy_{end}"][at] for end in ("low", "high"))
+        assert low < rock[at] < high < 1.7 * low
+    assert found["filter.layers"][-1] >= 1
+    soft, hard = (found["supply.supply_pressure"][at] for at in (np.searchsorted(depth, 0.07), -1))
+    assert hard > 1.08 * soft
+    scores = rock_following.scores(found)
+    assert 0.8 < scores["rate"] * (time[-1] - 2.0) / (depth[-1] - depth[time < 2.0][-1]) < 1.2
 
 
 def test_layers_have_a_crushing_energy():
