@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from percussion_model.analysis.comparison import Comparison, compare
+    from percussion_model.analysis.identify.drill import drill_of
+    from percussion_model.analysis.identify.profile import identify
     from percussion_model.analysis.stationary import Settled, settled
+    from percussion_model.interface.drill_log import read_log
     from percussion_model.physics.records import (
         BLOW,
         EVENT,
@@ -27,7 +30,10 @@ if TYPE_CHECKING:
 # costs only what is needed.
 _NAMES = {
     "analysis.comparison": ("Comparison", "compare"),
+    "analysis.identify.drill": ("drill_of",),
+    "analysis.identify.profile": ("identify",),
     "analysis.stationary": ("Settled", "settled"),
+    "interface.drill_log": ("read_log",),
     "physics.records": ("BLOW", "EVENT", "SAMPLE_FIELDS", "EventKind", "Mode"),
     "scene.bar_groups": ("BitBar", "PistonBar", "Section"),
     "scene.drive_calibration": ("calibrate_drive", "piston_cycle"),
@@ -60,7 +66,10 @@ __all__ = [
     "__version__",
     "calibrate_drive",
     "compare",
+    "drill_of",
+    "identify",
     "piston_cycle",
+    "read_log",
     "settled",
     "simulate",
 ]

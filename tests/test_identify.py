@@ -327,6 +327,10 @@ def test_a_log_without_a_scale_of_pressure_says_what_it_takes(holes):
     assert drill.changes(usual)["drive.force"] == drill.scene["drive.force"]
 
 
+def test_a_profile_is_represented_in_a_line(holes):
+    assert len(repr(holes["slow"][1])) < 80
+
+
 def test_collaring_is_left_out_as_asked(holes):
     hole, _ = holes["slow"]
     own = {"pressure": 2.4e6, "feed": 11e3, "speed": 5.7}

@@ -45,6 +45,8 @@ SURE = 1.96
 TOLD = 0.5
 # Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
 LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
+# Points and degree of a table; blows of a drill string take fifty times as long.
+MANY, FEW = (140, 3), (60, 2)
 # Mean absolute deviation of a normal variable, by its standard deviation.
 MAD = 0.6745
 
@@ -82,6 +84,10 @@ class Profile:
     worn: np.ndarray
     covariance: np.ndarray
     notes: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        ends = f"{self.depth[0]:.4g} to {self.depth[-1]:.4g} m"
+        return f"Profile({ends}, samples={len(self.depth)}, layers={len(self.layers) + 1})"
 
     def interval(self, which: int = Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Low end, value and high end of an unknown, of 95 %, SI."""
@@ -182,7 +188,8 @@ def identify(
     prior = prior_of(scene, rock)
     if table is None:
         wanted = _ranges(samples, prior, room or {})
-        table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s))
+        size = FEW if scene["effects.string"] else MANY
+        table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s), *size)
     samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
     samples = samples.kept(table.contains(samples.settings), "pressure or feed out of the usual")
     if len(samples.depth) < FEWEST:

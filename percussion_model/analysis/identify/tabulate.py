@@ -25,8 +25,6 @@ from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.simulate import SimulationError
 
-DEGREE = 3
-POINTS = 140  # four to a term
 # Half the least range of a setting, by the logarithm, and standard deviations of an unknown.
 LEAST_HALF, REACH = 0.02, 2.2
 # What a run may be off by: two hundredths in the rate of a motion that does not settle.
@@ -64,8 +62,8 @@ def tabulate(
     drive: Drive,
     ranges: Mapping[str, tuple[float, float]],
     progress: Callable[[float], None] | None = None,
-    points: int = POINTS,
-    degree: int = DEGREE,
+    points: int = 140,
+    degree: int = 3,
 ) -> Table:
     """Run a hammer over ranges of its settings and of the rock, and fit polynomials.
 
