@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.hardness_index import hardness_index
-from docs.blocks import DOCS, publish
+from docs.blocks import DOCS, renewed
 from percussion_model.analysis.identify.drill import Drill, drill_of
 from percussion_model.analysis.identify.observation import Q, Table
 from percussion_model.analysis.identify.plan import ROOM
@@ -26,6 +26,7 @@ from percussion_model.analysis.identify.profile import SURE, Profile, identify
 from percussion_model.analysis.identify.synthetic import Hole, csv_text, make_hole, steps_of
 from percussion_model.interface.drill_log import read_log
 from percussion_model.scene.hammers import hammer
+from percussion_model.scene.text import write_text
 
 HAMMER, ROCK = "dth5", "kuru-granite"
 # What was asked: behind a layer's top, after so much hole [m], q within so much.
@@ -158,7 +159,7 @@ def main(holes: int) -> None:
     )
     print(told)
     if holes >= PUBLISHED:
-        publish({"holes": told}, PAGE)
+        write_text(PAGE, renewed(PAGE, {"holes": told}))
     own, truth = drills()
     hole = make_hole(truth, prior_of(own.scene, ROCK), steps_of(truth), 1, depth=40.0)
     began = time.perf_counter()
