@@ -86,6 +86,7 @@ TERMINALS = (
             "unloading_ratio": "rock.unloading_ratio",
             "barrier_damping": "rock.barrier_damping",
             "barrier_energy": "rock.barrier_energy",
+            "crushing_energy": "breaking.crushing_energy",
             "bit_position": "bit.position",
             "bit_force": "bit.force",
             "hole_depth": "hole_depth",
