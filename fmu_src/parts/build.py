@@ -35,8 +35,14 @@ STOP_TIME, STEP_SIZE = 4.0, 1e-3
 PARTS = {
     module.TABLE.name: module.TABLE
     for module in (
-        drill_string, wave_string, rig_feed, supply, rock_profile, controller, rock_filter,
-    )  # fmt: skip
+        drill_string,
+        wave_string,
+        rig_feed,
+        supply,
+        rock_profile,
+        controller,
+        rock_filter,
+    )
 }
 
 
