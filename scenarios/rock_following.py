@@ -121,7 +121,7 @@ def draw(runs: Mapping[str, CoupledRun], path: Path) -> Path:
     depth, share = 1e3 * found["hammer.bit.position"], 0.64
     low, high = (1e-6 * found[f"filter.apparent_energy_{end}"] for end in ("low", "high"))
     rock.fill_between(depth, low, high, alpha=0.25, linewidth=0, label="interval of 95 %")
-    rock.plot(depth, 1e-6 * found["filter.apparent_energy"], label="told by the filter")
+    rock.plot(depth, 1e-6 * found["filter.apparent_energy"], label="shown by the filter")
     rock.plot(depth, 1e-6 * found["rock.crushing_energy"] / share, "k--", label="rock")
     rock.set_ylim(0.0, 260.0)
     rock.legend(loc="upper right", ncols=3)
@@ -133,7 +133,7 @@ def draw(runs: Mapping[str, CoupledRun], path: Path) -> Path:
     label(rock, "", "energy / efficiency [MJ/m³]")
     label(pressure, "", "pressure [bar]")
     label(feed, "depth [mm]", "feed on the bit [kN]")
-    head(figure, "Rock told as the bit goes on, and what follows it")
+    head(figure, "Rock shown as the bit goes on, and what follows it")
     return save_png(figure, path, 110)
 
 

@@ -141,7 +141,7 @@ def _numbers() -> Entries:
 TABLE = PartTable(
     name="RockFilter",
     slave=RockFilterPart,
-    description="Rock told from rate, pressure, feed, rotation: crushing energy by efficiency",
+    description="Rock from rate, pressure, feed, rotation: crushing energy by efficiency",
     inputs={
         "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
         "rate_of_penetration": ("m/s", -1e4, 1e4, 0.0, "measured rate of penetration"),

@@ -142,8 +142,8 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
             table.append((at, cells))
     if not table:
         raise IdentifyError(f"{path}: row {number}, column 1: no row of numbers is behind it")
-    notes = [f"{cut} rows are cut off; left out"] * bool(cut)
-    notes += [f"{again} rows repeat the heading; left out"] * bool(again)
+    notes = [f"{cut} rows are cut off; dropped"] * bool(cut)
+    notes += [f"{again} rows repeat the heading; dropped"] * bool(again)
     found = {
         one.name: _values(path, one, number, titles, table, separator, notes) for one in columns
     }
@@ -251,7 +251,7 @@ def _columns(
         if one.name in found:
             raise IdentifyError(
                 f"{path}: row {number}, column {place + 1}: {shortened(title)!r} is {one.name}, as "
-                f"column {found[one.name].place + 1} is: tell by --columns which one"
+                f"column {found[one.name].place + 1} is: choose one by --columns"
             )
         found[one.name] = one
     if lacking := [name for name in given if name not in found]:

@@ -20,7 +20,7 @@ MEGA = 1e-6
 RPM = 30.0 / math.pi
 WORDS = {
     "apparent_energy": ("energy / efficiency", "MJ/m³", MEGA),
-    "unloading_ratio": ("unloading ratio", "–", 1.0),
+    "unloading_ratio": ("ratio of unloading", "–", 1.0),
     "loading_stiffness": ("loading stiffness", "kN/mm", 1e-6),
     "renewal_length": ("renewal length", "mm", 1e3),
     "threshold": ("threshold of a button", "J", 1.0),
@@ -76,14 +76,14 @@ def notes(found: Profile) -> list[str]:
     said = [
         *found.samples.notes,
         f"Noise of a sample, and error of the table: {shown}.",
-        "A rate tells the crushing energy by the efficiency of the bit; the strength has the "
+        "A rate shows the crushing energy by the efficiency of the bit; the strength has the "
         "interval of the efficiency and of the relation as well. A bit that wears seems to meet "
         "harder rock.",
     ]
     if not found.told()["renewal_length"]:
         said.append(
             "Rotation was too even to part the crushing energy from the share of fresh rock: the "
-            "interval holds both. Steps of rotation would tell (--plan)."
+            "interval holds both. Steps of rotation would show (--plan)."
         )
     return said
 
@@ -107,12 +107,12 @@ def plan_words(changes: Sequence[Change]) -> str:
     best = changes[0]
     if not best.setting or best.spread > 0.97 * now.spread:
         return (
-            "No change of the next metre tells more of the crushing energy than going on as now: "
+            "No change of the next metre shows more of the crushing energy than going on as now: "
             f"± {100 * now.interval:.2g} %."
         )
     name, unit, factor = SETTING[best.setting]
     also = [WORDS[one][0] for one in best.narrowed]
-    tells = f" It tells {' and '.join(also)} too." if also else ""
+    tells = f" It shows {' and '.join(also)} too." if also else ""
     return (
         f"Drill half of the next metre with {name} at {factor * best.value:.3g} {unit}, "
         f"{100 * best.share:.0f} % of now: the crushing energy / efficiency is then known to "
@@ -155,14 +155,14 @@ def write_pages(
     tables: list[Table] = [
         ("Layers", LAYER_HEADS, layer_rows(found)),
         (
-            "What the log tells",
+            "What the log shows",
             ("behind the last sample", "value", "95 %", ""),
             unknown_rows(found),
         ),
         ("Rows", ("rule", "rows"), count_rows(found)),
     ]
     if changes:
-        heads = ("half of the next metre", "energy / efficiency", "tells too")
+        heads = ("half of the next metre", "energy / efficiency", "shows too")
         tables.insert(0, ("The next metre", heads, plan_rows(changes)))
     with staged(folder) as draft:
         (draft / "rock.csv").write_text(csv_text(found, every), encoding="utf-8")

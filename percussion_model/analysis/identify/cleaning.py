@@ -141,7 +141,7 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
         new[1:] = ~same
         resets = int(np.sum(np.diff(time) < 0.0))
         if resets:
-            notes.append(f"time: set back {resets} times; the depth tells the order")
+            notes.append(f"time: set back {resets} times; the depth shows the order")
     there = np.isfinite(depth) & np.all(np.isfinite(settings), axis=1)
     leaps = _leaps(depth)
     deepest = np.maximum.accumulate(np.where(np.isfinite(depth) & ~leaps, depth, -np.inf))
@@ -168,7 +168,7 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
         told = ", ".join(f"{rule} {count}" for rule, count in found.dropped.items())
         raise IdentifyError(
             f"{log.name}: {len(found.depth)} of {total} rows are left, at least {FEWEST} are "
-            f"wanted; left out: {told or 'none'}"
+            f"wanted; dropped: {told or 'none'}"
         )
     return found
 
@@ -196,7 +196,7 @@ def _rate(log: Log, notes: list[str]) -> np.ndarray:
     if "rate" in columns:
         return columns["rate"]
     if "depth" not in columns or "time" not in columns:
-        raise IdentifyError(f"{log.name}: no column is rate, and depth over time tells none")
+        raise IdentifyError(f"{log.name}: no column is rate, and depth over time shows none")
     passed = np.cumsum(_steps(columns["time"]))
     rate = np.full(len(passed), np.nan)
     span = passed[OVER:] - passed[:-OVER]

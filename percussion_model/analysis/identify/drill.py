@@ -47,7 +47,7 @@ class Drill:
         usual = float(np.median(values[values > 0.0]))
         said = (
             f"pressure: the hammer's drive is taken to hold at the log's median, {usual:.4g} Pa, "
-            "and to grow in proportion; tell it by --pressure"
+            "and to grow in proportion; give it by --pressure"
         )
         return replace(self, pressure=usual), said
 
@@ -75,7 +75,9 @@ def drill_of(scene: Scene, name: str = "", pressure: float | None = None) -> Dri
             raise IdentifyError(f"--pressure: the scene has its own, {kind}.supply_pressure")
         return Drill(scene, float(scene[f"{kind}.supply_pressure"]))
     if kind != "pressure":
-        raise IdentifyError(f"effects.drive = {kind!r}: rock is told of a hammer with a pressure")
+        raise IdentifyError(
+            f"effects.drive = {kind!r}: rock is identified for a hammer with a pressure"
+        )
     if pressure is None and name in AIR:
         rows = read_toml(CHAMBER_FILES / "laws.toml")[name]
         pressure = float(np.interp(scene["drive.force"], rows["force"], rows["pressure"]))

@@ -47,7 +47,7 @@ class IdentifyError(ValueError):
 def check_scene(scene: Scene) -> None:
     """Raise `IdentifyError` for a scene whose blows the equations of the table do not hold for."""
     if not (scene["effects.breaking"] and scene["effects.rotation"]):
-        raise IdentifyError("rock is told from a bit that breaks and turns: give --bit")
+        raise IdentifyError("rock is identified from a bit that breaks and turns: give --bit")
     for key, why in (
         ("rotation.old_line", "rock met again has to be crushed again"),
         ("breaking.flushed_volume", "flushing must not limit"),

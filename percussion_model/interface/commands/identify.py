@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _PRESSURE = "Pressure at which the drive of the hammer holds; stored for dth hammers."
 _EVERY = "Step of depth of the rows that are written."
-_COLLARING = "Hole at its collar that is left out."
+_COLLARING = "Hole at its collar that is dropped."
 
 
 def identify(
@@ -41,7 +41,10 @@ def identify(
         float, common.number_option("--collaring", "LENGTH", "start.depth", _COLLARING)
     ] = 0.5,
     plan: Annotated[
-        bool, typer.Option("--plan", help="Tell which change in the next metre would tell most.")
+        bool,
+        typer.Option(
+            "--plan", help="Show which change in the next metre would narrow the interval most."
+        ),
     ] = False,
     part: Annotated[
         Path | None,
@@ -59,7 +62,7 @@ def identify(
     json_file: common.JsonFile = None,
     force: common.Force = False,
 ) -> None:
-    """Tell the rock along a hole from a log of the rig, in out/LOG-rock."""
+    """Show the rock along a hole from a log of the rig, in out/LOG-rock."""
     from percussion_model.analysis.identify.plan import ROOM
     from percussion_model.analysis.identify.plan import plan as plan_next
     from percussion_model.analysis.identify.profile import identify as tell_rock

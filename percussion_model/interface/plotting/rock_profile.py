@@ -44,7 +44,7 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     for ax in axes:
         for top in found.layers:
             ax.axhline(top, color=red, linewidth=0.8, linestyle=":")
-    style.label(axes[0], "crushing energy / efficiency [MJ/m³]", "depth [m]", "What the rate tells")
+    style.label(axes[0], "crushing energy / efficiency [MJ/m³]", "depth [m]", "What the rate shows")
     style.label(axes[1], "strength [MPa]", "", "By the library's relation")
     style.label(axes[2], "rate [m/h]", "", "Log")
     style.label(axes[3], "by the median [–]", "", "Settings")
