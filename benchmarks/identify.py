@@ -99,7 +99,7 @@ def score(hole: Hole, found: Profile) -> Score:
     return Score(
         float(holds.mean()), float(holds[late].mean()), float(np.median(found.spread[late, Q])),
         np.array(errors), np.array(others), scale, np.array(samples), len(hole.tops) - 1,
-        len(found.layers), found.told()["renewal_length"],
+        len(found.layers), found.determined()["renewal_length"],
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Rock told as the bit goes on, and what it is worth: `python -m scenarios.rock_following`.
+"""Rock found as the bit goes on, and what that is worth: `python -m scenarios.rock_following`.
 
 Three controllers drill soft, hard and soft rock: set points held, the seeker of the best rate, and
 set points that follow the rock as the filter tells it.

@@ -222,8 +222,8 @@ def test_the_lag_of_the_rate_is_found_and_told(holes):
 def test_at_one_rotation_the_interval_says_what_it_cannot_know(holes):
     """The share of fresh rock is held with its prior, and its doubt is in the interval."""
     (_, steps), (hole, slow) = holes["steps"], holes["slow"]
-    assert steps.told()["renewal_length"]
-    assert not slow.told()["renewal_length"]
+    assert steps.determined()["renewal_length"]
+    assert not slow.determined()["renewal_length"]
     assert slow.spread[-1, RENEWAL] > 0.7 * slow.prior.spread[RENEWAL]
     assert np.median(slow.spread[:, Q]) > 1.5 * np.median(steps.spread[:, Q])
     off = np.abs(slow.mean[:, Q] - hole.truth(slow.depth))
@@ -346,7 +346,7 @@ def test_the_command_tells_the_rock_of_a_hole(tmp_path, capsys):
     numbers = read_toml(tmp_path / "part.toml")["parameters"]["filter"]
     assert from_numbers(numbers).table.contains(np.array([[2.4e6, 12.1e3, 5.0]]))[0]
     said = capsys.readouterr()
-    assert "held with its prior" in said.out
+    assert "not determined: its prior" in said.out
     assert "next metre" in said.out
     told = json.loads(found.read_text())
     assert told["samples"] + sum(told["dropped"].values()) == told["rows"]

@@ -1,4 +1,4 @@
-"""The filter of `percussion identify` beside a controller: rock told as the bit goes on.
+"""The filter of `percussion identify` beside a controller: rock found as the bit goes on.
 
 It takes the means of what a rig measures over each interval, and gives the crushing energy by the
 efficiency of the bit with its interval. Set points may follow it,

@@ -1,4 +1,4 @@
-"""Words, tables and files of rock that was told from a log."""
+"""Words, tables and files of rock from a log."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WORDS = {
 SETTING = {"pressure": ("pressure", "bar", 1e-5), "feed": ("feed", "kN", 1e-3),
            "speed": ("rotation", "rpm", RPM)}  # fmt: skip
 LAYER_HEADS = ("layer,\nm", "energy / efficiency,\nMJ/m³", "\n95 %", "strength,\nMPa", "\n95 %")
-TOLD, HELD = "told", "held with its prior"
+DETERMINED, HELD = "determined", "not determined: its prior"
 
 Table = tuple[str, Sequence[str], list[tuple[str, ...]]]
 
@@ -48,13 +48,13 @@ def layer_rows(found: Profile) -> list[tuple[str, ...]]:
 
 
 def unknown_rows(found: Profile) -> list[tuple[str, ...]]:
-    """Rows of the unknowns behind the last sample, and whether the log tells them."""
-    told = found.told()
+    """Rows of the unknowns behind the last sample, and whether the log determines them."""
+    known = found.determined()
     rows: list[tuple[str, ...]] = []
     for k, name in enumerate(UNKNOWNS):
         words, unit, factor = WORDS[name]
         low, value, high = (factor * one[-1] for one in found.interval(k))
-        said = TOLD if told[name] else HELD
+        said = DETERMINED if known[name] else HELD
         rows.append((f"{words}, {unit}", f"{value:.3g}", f"{low:.3g} to {high:.3g}", said))
     return rows
 
@@ -80,7 +80,7 @@ def notes(found: Profile) -> list[str]:
         "interval of the efficiency and of the relation as well. A bit that wears seems to meet "
         "harder rock.",
     ]
-    if not found.told()["renewal_length"]:
+    if not found.determined()["renewal_length"]:
         said.append(
             "Rotation was too even to part the crushing energy from the share of fresh rock: the "
             "interval holds both. Steps of rotation would show (--plan)."
@@ -102,7 +102,7 @@ def plan_rows(changes: Sequence[Change]) -> list[tuple[str, ...]]:
 
 
 def plan_words(changes: Sequence[Change]) -> str:
-    """Say which change of the next metre tells most."""
+    """Say which change of the next metre would show most."""
     now = next(one for one in changes if not one.setting)
     best = changes[0]
     if not best.setting or best.spread > 0.97 * now.spread:

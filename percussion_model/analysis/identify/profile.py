@@ -41,8 +41,8 @@ from percussion_model.scene.scene import Scene
 
 # Standard deviations of an interval of 95 %.
 SURE = 1.96
-# The data tell what they narrow to less than this share of its prior.
-TOLD = 0.5
+# The data determine what they narrow to less than this share of its prior.
+DETERMINED = 0.5
 # Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
 LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
 # Points and degree of a table; blows of a drill string take fifty times as long.
@@ -97,7 +97,7 @@ class Profile:
     def strength(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compressive strength by the library's relation: low end, value and high end [Pa].
 
-        The crushing energy is the quantity told times the efficiency of the bit; the interval has
+        The crushing energy is what the log shows times the efficiency of the bit; the interval has
         that of the efficiency and that of the relation as well.
         """
         eta = math.sqrt(EFFICIENCY.low * EFFICIENCY.high) * self.worn
@@ -109,9 +109,9 @@ class Profile:
         energy = self.mean[:, Q] + np.log(eta)
         return tuple(strength_by_energy(np.exp(energy + k * off)) for k in (-1.0, 0.0, 1.0))  # type: ignore[return-value]
 
-    def told(self) -> dict[str, bool]:
-        """Whether the log tells an unknown, or it is held with its prior."""
-        narrow = self.spread[-1] < TOLD * self.prior.spread
+    def determined(self) -> dict[str, bool]:
+        """Whether the log determines an unknown, or it keeps its prior."""
+        narrow = self.spread[-1] < DETERMINED * self.prior.spread
         return {name: bool(narrow[k]) for k, name in enumerate(UNKNOWNS)}
 
     def every(self, step: float) -> np.ndarray:
@@ -133,7 +133,7 @@ class Profile:
                  "strength_low": strength[0], "strength_high": strength[2]}
             )  # fmt: skip
         return {
-            "layers": found, "told": self.told(), "rows": self.samples.total,
+            "layers": found, "determined": self.determined(), "rows": self.samples.total,
             "samples": len(self.depth), "dropped": self.samples.dropped,
             "noise": dict(zip(SIGNALS, self.noise.values().tolist(), strict=True)),
             "table_errors": dict(zip(SIGNALS, self.table.errors.tolist(), strict=True)),

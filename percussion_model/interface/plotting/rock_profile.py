@@ -1,4 +1,4 @@
-"""Figure of rock along a hole, told from a log."""
+"""Figure of rock along a hole, from a log."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     style.label(axes[3], "by the median [–]", "", "Settings")
     axes[0].set_ylim(float(found.depth[-1]), float(found.depth[0]))
     handles = [
-        Line2D([], [], color=blue, label="told"),
+        Line2D([], [], color=blue, label="from the log"),
         Patch(facecolor=blue, alpha=0.22, label="interval of 95 %"),
         Line2D([], [], color=red, linestyle=":", label="change of layer"),
         *axes[3].get_legend_handles_labels()[0],
