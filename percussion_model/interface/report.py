@@ -174,7 +174,7 @@ STUDY_CAPTIONS = {
 DRAWN = "Drag a box to look closer, double-click to see all again."
 OF_STUDY = (
     "Drag a box to look closer, of samples to choose points (with Shift: to look closer); "
-    "double-click to see all again. The pointer tells of a point."
+    "double-click to see all again. The pointer shows the values of a point."
 )
 # So many failed points are listed.
 MOST_FAILURES = 10

@@ -35,7 +35,7 @@ export function fitted(canvas) {
   return { width: width / scale, height: height / scale, scale };
 }
 
-function shareOf(value, [low, high], log) {
+export function shareOf(value, [low, high], log) {
   return log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
 }
 

@@ -1,8 +1,8 @@
 // Figures of a study in its report: a map with cuts, or scatter over each parameter, and a table.
 import { inDigits, short } from "./numbers.js";
-import { Plot, tickText } from "./plot.js";
+import { Plot, shareOf, tickText } from "./plot.js";
 
-const ROW = 26, ROOM = 40, FEW = 6, MOST_LINES = 9, COUNT = 0, GIVEN = 5, KNOWN = 3;
+const ROW = 26, ROOM = 40, FEW = 6, MOST_LINES = 9, WIDE = 10, COUNT = 0, GIVEN = 5, KNOWN = 3;
 const VIRIDIS = ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"];
 
 const study = JSON.parse(document.getElementById("study-data").textContent);
@@ -92,7 +92,9 @@ function map(box) {
   function draw() {
     const name = select.value, base = sliders.reduce((sum, one) => sum + one(), 0), { title, digits } = quantity(name);
     cells = y.values.flatMap((_, j) => x.values.map((_, i) => base + j * y.stride + i * x.stride));
-    const values = cells.map(k => isHidden(name, k) ? NaN : columns[name][k]), [low, high] = limits(values), share = v => (v - low) / (high - low);
+    const values = cells.map(k => isHidden(name, k) ? NaN : columns[name][k]), [low, high] = limits(values);
+    // a map over more than a decade would be of one colour
+    const steps = low > 0 && high > WIDE * low, share = v => shareOf(v, [low, high], steps);
     drawCells(name, values, share);
     left.head.textContent = title;
     right.head.textContent = `Cuts: ${y.label} from ${tickText(Math.min(...y.values))} (dark) to ${tickText(Math.max(...y.values))} (light)`;
@@ -100,7 +102,7 @@ function map(box) {
     rows.forEach((row, k) => right.plot.line(x.values.map((at, i) => [at, values[row * x.values.length + i]]), viridis(0.92 * k / Math.max(rows.length - 1, 1)), 2));
     right.plot.frame();
     const undecided = values.some((_, j) => isHidden(name, cells[j]));
-    key.innerHTML = `<span>${shown(low, digits)}</span><i></i><span>${shown(high, digits)}</span>${undecided ? `<b>hatched: ${study.word}, error ≥ rate</b>` : ""}`;
+    key.innerHTML = `<span>${shown(low, digits)}</span><i></i><span>${shown(high, digits)}${steps ? ", by ratios" : ""}</span>${undecided ? `<b>hatched: ${study.word}, error ≥ rate</b>` : ""}`;
   }
   function drawCells(name, values, share) {
     const { plot } = left, pen = plot.begin(...range, x.label, y.label, logs);
