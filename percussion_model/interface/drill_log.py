@@ -76,13 +76,18 @@ SAID = {"rpm": "rpm", "rotation rpm": "rpm", "bpm": "1/min"}
 # Words and numbers of loggers for a value that is missing.
 MISSING = frozenset(("", "nan", "null", "none", "-", "--", "n/a", "#n/a", "na", "inf", "-inf"))
 SENTINELS = frozenset((-999.0, -999.25, -9999.0, -99999.0))
+# Spellings of rigs, by SI unit of the column.
+SPELLED = {
+    "N m": {"Nm": "N m", "kNm": "kN m"},
+    "rad/s": dict.fromkeys(("1/min", "U/min", "min-1", "r/min"), "rpm"),
+}
 _MEAN = frozenset(("avg", "ave", "average", "mean", "mwd", "sample"))
 _CLOCK = re.compile(
     r"(?:(?P<date>\S+)[ T])?(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d+)?))?Z?"
 )
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%Y/%m/%d")
 DAY = 86400.0
-_WANTED = "rate is wanted, or depth and time; and pressure, feed, rpm, torque as far as there are"
+_WANTED = "rate is wanted, or depth and time; and pressure, feed, speed, torque as far as there are"
 
 
 class _Column(NamedTuple):
@@ -143,6 +148,11 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
     if not table:
         raise IdentifyError(f"{path}: row {number}, column 1: no row of numbers is behind it")
     notes = [f"{cut} rows are cut off; dropped"] * bool(cut)
+    used = {one.place for one in columns}
+    unused = [
+        f"{k + 1} {shortened(one)!r}" for k, one in enumerate(titles) if k not in used and one
+    ]
+    notes += [f"columns not used: {', '.join(unused)}; give them by --columns"] * bool(unused)
     notes += [f"{again} rows repeat the heading; dropped"] * bool(again)
     found = {
         one.name: _values(path, one, number, titles, table, separator, notes) for one in columns
@@ -307,6 +317,7 @@ def _values(
 
 def _factor(unit: str, one: _Column, where: str) -> float:
     """Factor to SI; where a mapping has a factor the unit may be one of any quantity."""
+    unit = SPELLED.get(COLUMNS[one.name], {}).get(unit.strip(), unit)
     if one.is_mapped:
         for si, units in UNITS.items():
             if plain_unit(unit) in units:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from percussion_model.analysis.identify.drill import Drill
     from percussion_model.analysis.identify.profile import Profile
 
+# Less is a number without its unit [Pa].
+LEAST_PRESSURE = 1e3
 _PRESSURE = "Pressure at which the drive of the hammer holds; stored for dth hammers."
 _EVERY = "Step of depth of the rows that are written."
 _COLLARING = "Hole at its collar that is dropped."
@@ -71,6 +73,8 @@ def identify(
 
     if not every > 0.0:
         raise common.refusal(f"--every {every:g}: must be above 0 m")
+    if pressure is not None and pressure < LEAST_PRESSURE:
+        raise common.refusal(f"--pressure {pressure:g}: needs a unit, as in '24 bar'")
     drill = _drill(hammer, bit, settings, solver, pressure)
     common.check_json(json_file)
     common.check_file("--part", part)
