@@ -88,8 +88,9 @@ class WaveString(TakesRods, Model):
         h = self.span
         if abs(step_size - h) > ROUNDING * h:
             raise ValueError(
-                f"a step of {step_size!r} s: must be communication_step, {h!r} s"
-            )  # fmt: skip
+                f"a step of {step_size!r} s: communication_step is {h!r} s: take steps of that, or "
+                f"set communication_step = {step_size!r}"
+            )
         self._take(inputs)
         body, free = self.body, self._free_of(self.body.cells)
         packets, before = self._packets(), body.head
@@ -110,6 +111,11 @@ class WaveString(TakesRods, Model):
         """Keep a wave that the hammer has sent whole."""
         begin, h = inputs["returned_begin"], self.span
         is_whole = inputs["returned_until"] >= begin + h * (1.0 - 1e-4)
+        if is_whole and begin > self.known_until + 0.5 * h:
+            raise ValueError(
+                f"returned_begin = {begin!r} s: the wave from {self.known_until!r} s on is "
+                f"lacking: the hammer must take steps of communication_step, {h!r} s"
+            )
         if is_whole and begin > self.known_until - 0.5 * h:
             shares = [float(inputs[name]) for name in _UP]
             self.returned += [begin, *shares]
@@ -139,6 +145,7 @@ class WaveString(TakesRods, Model):
     def signals(self) -> dict[str, Any]:
         """What hammer, rig, rock and controller take."""
         return {
+            "impedance": self.body.impedance,
             "wave_begin": self.begin_of_wave,
             "wave_span": self.span,
             **dict(zip(_DOWN, self.wave, strict=True)),
@@ -199,6 +206,7 @@ TABLE = PartTable(
         "add_rod": ("", 0, 1, False, "a rising edge adds a rod, where rod_wanted"),
     },
     outputs={
+        "impedance": ("N s/m", "impedance of the rods"),
         "wave_begin": ("s", "when the step begins whose wave goes down"),
         "wave_span": ("s", "length of that step"),
         **{
@@ -243,8 +251,8 @@ TABLE = PartTable(
     },
     at_start=dict.fromkeys(
         (
-            "wave_begin", "wave_span", "wave_1", "wave_2", "feed_force_mean", "length", "weight",
-            "rod_wanted", "momentum", "energy.stored", "rod_count",
+            "impedance", "wave_begin", "wave_span", "wave_1", "wave_2", "feed_force_mean",
+            "length", "weight", "rod_wanted", "momentum", "energy.stored", "rod_count",
         ),
         (),
     ),

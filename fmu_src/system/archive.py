@@ -97,6 +97,10 @@ def _check_entries(path: Path, found: dict[str, Any]) -> None:
     lacking = [key for key in (*_KINDS, *_TABLES) if key not in found]
     if lacking:
         raise SystemPlanError(f"{path}: {', '.join(lacking)} missing")
+    known = (*_KINDS, *_TABLES, "fidelity")
+    for key in found:
+        if key not in known:
+            raise SystemPlanError(f"{path}: unknown key {shortened(key)}: {said_among(key, known)}")
     for key, kind in _KINDS.items():
         if not isinstance(found[key], kind) or isinstance(found[key], bool):
             shown = show_value(found[key])

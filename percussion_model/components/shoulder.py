@@ -56,7 +56,8 @@ def push_by(par, squeezed, speed):
 def on_bit(par, s, h):
     """Mean push over the next h, with what was missed before [N]."""
     speed = s.shoulder_velocity - s.v_b
-    return push_by(par, squeeze(par, s) + 0.5 * h * speed, speed) + s.shoulder_owed / h
+    owed = s.shoulder_owed / max(h, par.shoulder_step)  # not all of it at once
+    return push_by(par, squeeze(par, s) + 0.5 * h * speed, speed) + owed
 
 
 @inlined
@@ -209,7 +210,7 @@ def move_casing(par, s, at, reach, h, force):
     wave, going_on = Powers(value_beyond(s), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), at < 1.0
     if going_on:
         wave = about(powers_of(s), at, reach)
-    fall = par.shoulder_impedance * h / par.shoulder_casing_mass
+    fall = s.shoulder_impedance * h / par.shoulder_casing_mass
     own, term, v, way = force * h / par.shoulder_casing_mass, s.shoulder_velocity, 0.0, 0.0
     up, down, powers = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0, 1.0)
     for n in range(TERMS):
@@ -223,7 +224,7 @@ def move_casing(par, s, at, reach, h, force):
         term = (2.0 * fall * given + own - fall * term) / (n + 1.0)
         own = 0.0
     for k in range(4):
-        share = WEIGHTS[k] * par.shoulder_impedance * h
+        share = WEIGHTS[k] * s.shoulder_impedance * h
         s.shoulder_rod_work += share * (down[k] * down[k] - up[k] * up[k])
         if going_on:
             give_back(s, at + PLACES[k] * reach, reach * WEIGHTS[k] * up[k])
@@ -255,7 +256,7 @@ def follow(par, s, h):
     s.shoulder_push = s.f_shoulder_bit
     force = s.feed + par.shoulder_casing_mass * par.gravity
     force -= (recoil - s.shoulder_recoil) / h + s.shoulder_push
-    swift = SHORT * par.shoulder_casing_mass / max(par.shoulder_impedance, LEAST_DIVISOR)
+    swift = SHORT * par.shoulder_casing_mass / max(s.shoulder_impedance, LEAST_DIVISOR)
     most, left, end = min(PIECE * span, swift), h, 1.0 - ROUNDING
     while left > 0.0:
         piece = min(most, left)
@@ -319,7 +320,7 @@ COMPONENT = Component(
         "rod_work": ("J", "work of the rod on the casing", 0.0),
     },
     pass_time=pass_time,
-    inputs=("wave_begin", "wave_span", *(f"wave_{k + 1}" for k in range(DEGREES))),
+    inputs=("impedance", "wave_begin", "wave_span", *(f"wave_{k + 1}" for k in range(DEGREES))),
     hidden=(
         *("owed", "recoil", "squeeze", "over", "now_begin"),
         *(f"now_{k + 1}" for k in range(DEGREES)),

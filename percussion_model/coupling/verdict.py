@@ -300,7 +300,8 @@ def _limits(columns: Mapping[str, np.ndarray]) -> list[str]:
     return [
         f"{text} in {_percent(share)} of the rows ({name})"
         for name, text in LIMITS.items()
-        if name in columns and (share := float(np.mean(columns[name][1:] > 0.0))) > 0.0
+        if len(columns.get(name, ())) > 1
+        and (share := float(np.mean(columns[name][1:] > 0.0))) > 0.0
     ]
 
 

@@ -21,7 +21,7 @@ SQUARES = 1.0 / (2.0 * np.arange(DEGREES) + 1.0)
 def casing(**values):
     """A casing that no shoulder holds back."""
     par, s = np.zeros(1, RIGID_PAR)[0], np.zeros(1, RIGID_STATE)[0]
-    par["shoulder_casing_mass"], par["shoulder_impedance"] = MASS, IMPEDANCE
+    par["shoulder_casing_mass"], s["shoulder_impedance"] = MASS, IMPEDANCE
     par["shoulder_stiffness"] = 1.0
     s["shoulder_wave_span"], s["feed"] = SPAN, FORCE
     for name, value in values.items():
