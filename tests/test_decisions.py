@@ -40,7 +40,7 @@ def test_the_error_covers_both_motions_on_stiff_rock(modes):
 def test_a_close_decision_is_named():
     (said,) = simulate(stiff_rock(), record_events=False).warnings
     assert "rock.barrier_energy" in said
-    assert "another resolution may decide otherwise; the rate is 10.20 mm/s then" in said
+    assert "another discretisation may decide otherwise; the rate is 10.20 mm/s then" in said
 
 
 def test_a_request_that_a_close_decision_may_break_is_not_called_met(monkeypatch):

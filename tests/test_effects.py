@@ -69,6 +69,7 @@ def test_every_effect_of_the_reference_is_turned():
         "piston": "rigid",
         "piston and bit": "rigid",
         "leaps": "off",
+        "shoulder": "on",
     }
     # whatever a scene calls an effect has a variant
     assert set(Scene().effects_on) <= set(found)

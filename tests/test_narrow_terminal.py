@@ -148,7 +148,7 @@ def test_statements_of_the_paper_fit(shown, monkeypatch):
     monkeypatch.setattr(module, "_statements", lambda *words: iter(made))
     monkeypatch.setattr(module, "_sweeps", lambda *words: {"d": None})
     # what takes these names at its import would keep the patched ones
-    for user in ("", ".compared_blows", ".coupled_signals", ".effect_bars", ".interactive_run"):
+    for user in ("", ".compared_blows", ".coupled_signals", ".effect_bars"):
         importlib.import_module(f"percussion_model.interface.plotting{user}")
     for name, place in (
         ("run_drops", "percussion_model.verification.paper.runs"),

@@ -100,7 +100,9 @@ def test_systems_have_names_too():
         "air_drilling",
         "extremum_seeking",
         "feed_control",
+        "rock_following",
         "two_way_seeking",
+        "wave_drilling",
     }
     assert all(system_file(path.relative_to(path.parent).with_suffix("")) == path
                for path in system_presets().values())  # fmt: skip

@@ -49,7 +49,7 @@ def test_solvers_and_effects_of_the_stored_scenes():
         for name in ("reference", "drop_test", "rigid", "undamped")
     )
     every = ("gravity", "feed", "drive", "loss", "barrier", "rock")
-    turns = ("breaking", "rotation")
+    turns = ("breaking", "rotation", "shoulder")
     assert (reference.solver_name, reference.effects_on) == ("modal", every)
     assert (drop.solver_name, drop.effects_off) == ("modal", ("drive", "cuttings", *turns))
     assert (rigid.solver_name, rigid.effects_off) == ("rigid", ("loss", "cuttings", *turns))

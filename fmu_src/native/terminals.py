@@ -41,6 +41,21 @@ TERMINALS = (
         },
     ),
     Terminal(
+        "rod",
+        "drill string that exchanges waves with the casing, for effects.shoulder",
+        {
+            **{f"wave_{k}": f"shoulder.wave_{k}" for k in range(1, 9)},
+            **{f"returned_{k}": f"shoulder.returned_{k}" for k in range(1, 9)},
+            **{
+                name: f"shoulder.{name}"
+                for name in (
+                    *("impedance", "wave_begin", "wave_span"),
+                    *("returned_begin", "returned_until", "push"),
+                )
+            },
+        },
+    ),
+    Terminal(
         "supply",
         "supply of the drive with compressed air or oil",
         {

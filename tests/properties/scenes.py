@@ -97,7 +97,14 @@ STRING: dict[str, tuple[Any, ...]] = {
     "rotation.string_stiffness": (1e-3, 1e9),
     "rotation.inertia": (1e-6, 1e3),
 }
-BOUNDS = WIDE | ADVANCE | AIR | OIL | STRING
+# Of a casing that takes the feed, drawn after that.
+SHOULDER: dict[str, tuple[Any, ...]] = {
+    "shoulder.casing_mass": (1e-1, 1e4),
+    "shoulder.stiffness": (1e4, 1e9),
+    "shoulder.damping": (1e-1, 1e6, ZERO),
+    "shoulder.impedance": (1e2, 1e7, ZERO),
+}
+BOUNDS = WIDE | ADVANCE | AIR | OIL | STRING | SHOULDER
 SWITCHES = ("effects.breaking", "effects.rotation")
 # What a scene with breaking or rotation has to be given.
 NO_DEFAULT = ("hole_diameter", "breaking.buttons", "rotation.mean_radius")
@@ -302,6 +309,12 @@ def with_advance(source: Source, scene: Scene, reach: str) -> Scene:
     if changes.get("effects.rotation") and chance(source, 40):
         for key in STRING:
             changes[key] = number(source, key, reach) or 1.0
+    if chance(source, 20):
+        changes["effects.shoulder"] = True
+        for key in SHOULDER:
+            value = number(source, key, reach)
+            if value is not None:
+                changes[key] = value
     return scene.replace(**changes)
 
 
