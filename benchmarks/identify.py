@@ -27,6 +27,7 @@ from percussion_model.analysis.identify.synthetic import Hole, csv_text, make_ho
 from percussion_model.interface.drill_log import read_log
 from percussion_model.scene.hammers import hammer
 from percussion_model.scene.text import write_text
+from percussion_model.simulation.markdown import table
 
 HAMMER, ROCK = "dth5", "kuru-granite"
 # What was asked: behind a layer's top, after so much hole [m], q within so much.
@@ -122,41 +123,42 @@ def campaign(seeds: Iterable[int], steps: bool, table: Table | None = None) -> l
     return found
 
 
-def text(scores: list[Score]) -> str:
-    """Say what holes come to."""
-    errors = np.abs(np.concatenate([one.errors for one in scores]))
-    others = np.abs(np.concatenate([one.index_errors for one in scores]))
+def cells(scores: list[Score]) -> dict[str, str]:
+    """Say what holes come to, by what it is."""
+    errors = np.concatenate([one.errors for one in scores])
+    others = np.concatenate([one.index_errors for one in scores])
     middle = np.median([one.scale for one in scores])
-    blind = np.abs(np.concatenate([one.index_errors + one.scale - middle for one in scores]))
+    blind = np.concatenate([one.index_errors + one.scale - middle for one in scores])
     samples = np.concatenate([one.samples for one in scores])
     covered, late = (
-        100.0 * np.mean([getattr(one, name) for one in scores])
+        f"{100.0 * np.mean([getattr(one, name) for one in scores]):.1f} %"
         for name in ("covered", "covered_late")
     )
-    shares = {
-        words: f"{100 * np.median(off):.1f} % (median), within {100 * WITHIN:g} % in "
-        f"{100 * np.mean(off < WITHIN):.0f} % of the layers"
-        for words, off in (("filter", errors), ("own", others), ("one", blind))
+    shares = [
+        f"{100 * np.median(np.abs(off)):.1f} %; {100 * np.mean(np.abs(off) < WITHIN):.0f} %"
+        for off in (errors, others, blind)
+    ]
+    found = sum(one.found for one in scores)
+    spread = 100 * np.median([one.spread for one in scores])
+    return {
+        "holes; layers behind others; found": f"{len(scores)}; {len(errors)}; {found}",
+        "intervals of 95 % hold, of all samples": covered,
+        f"of those more than {AFTER:g} m below a top": late,
+        "standard deviation there": f"{spread:.1f} %",
+        f"samples to {AFTER:g} m below a top": f"{np.median(samples):.0f}",
+        f"error there, median; layers within {100 * WITHIN:g} %": shares[0],
+        "the same of the usual index, its scale from the truth of each hole": shares[1],
+        "the same, one scale for all holes": shares[2],
+        "holes in which the renewal length is said to be shown": f"{sum(o.told for o in scores)}",
     }
-    return (
-        f"{len(scores)} holes, {len(errors)} layers behind others, {sum(o.found for o in scores)} "
-        f"found.\nIntervals of 95 % hold {covered:.1f} % of all samples, {late:.1f} % of those "
-        f"more than {AFTER:g} m below a top; standard deviation there "
-        f"{100 * np.median([one.spread for one in scores]):.1f} %.\n"
-        f"{AFTER:g} m below a top, {np.median(samples):.0f} samples, off by {shares['filter']}.\n"
-        f"The usual index, with its scale from the truth of each hole: {shares['own']}; with one "
-        f"scale for all holes: {shares['one']}.\nRenewal length said to be told in "
-        f"{sum(one.told for one in scores)} holes."
-    )
 
 
 def main(holes: int) -> None:
     """Print both campaigns and the time of an hour at 1 Hz."""
-    kinds = (("Steps of rotation, pressure, feed", True), ("One slow rotation", False))
-    told = "\n\n".join(
-        f"**{words}**: {text(campaign(range(holes if steps else holes // 4), steps))}"
-        for words, steps in kinds
-    )
+    stepped = cells(campaign(range(holes), steps=True))
+    slow = cells(campaign(range(holes // 4), steps=False))
+    rows = [[what, stepped[what], slow[what]] for what in stepped]
+    told = table(["", "steps of rotation, pressure, feed", "one slow rotation"], rows)
     print(told)
     if holes >= PUBLISHED:
         write_text(PAGE, renewed(PAGE, {"holes": told}))

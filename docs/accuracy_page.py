@@ -52,6 +52,8 @@ COMPARED = (
     *("dth4_kuru", "dth5_st_anne", "t38_rods"),
 )
 OTHERS = ("drop_test", "aperiodic")
+# Between two bounds of one ratio.
+DASH = "–"
 # Errors that sentences state.
 STATED = (1e-2, 1e-3)
 # Run that sentences with set-up are about [s].
@@ -173,8 +175,8 @@ def summary_text(one: Summary) -> str:
     decided = one.scenes - one.undecided
     if not decided:
         return f"undecided ({one.scenes} scenes)"
-    ends = f"{bounds_text(one.worst)} to {bounds_text(one.luckiest)}"
-    return f"{bounds_text(one.median)} ({ends}; {decided} scenes)"
+    ends = f"{bounds_text(one.worst, DASH)} to {bounds_text(one.luckiest, DASH)}"
+    return f"{bounds_text(one.median, DASH)} ({ends}; {decided} scenes)"
 
 
 def lost(names: Sequence[str], found: dict[float, list[Contest]]) -> str:
@@ -186,8 +188,8 @@ def lost(names: Sequence[str], found: dict[float, list[Contest]]) -> str:
         if one.outcome != UNDECIDED and one.ratio < 1.0
     ]
     if not told:
-        faster = "At these errors no peer is faster than it."
-        return f"{faster} The last row is of waves, the second method."
+        faster = "At these errors no peer is faster than the default solver."
+        return f"{faster} The last row is of waves, the second method, which peers can beat."
     return f"A peer is faster in {'; '.join(told)}."
 
 
@@ -213,7 +215,8 @@ def advantage() -> str:
         "divided by that of the default solver (modes; in drill strings waves) for the same "
         "error of the rate: median, range and scenes. Below 1 the peer is faster. ≥ and ≤ are "
         "bounds, where no setting was so coarse that it misses the error, or so fine that it "
-        f"meets it. {lost(list(studies), contests(every))}"
+        f"meets it; a{DASH}b is one ratio between these bounds. "
+        f"{lost(list(studies), contests(every))}"
     )
     text = textwrap.fill(text, 88, break_long_words=False, break_on_hyphens=False)
     shown = table(["", *(f"error of {percent(wanted)}" for wanted in STATED)], rows)
