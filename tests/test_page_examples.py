@@ -38,12 +38,23 @@ def test_the_examples_of_python_run(capsys):
     assert "J each" in said
 
 
-def test_the_component_of_the_page_is_one():
-    (script,) = [one for one in examples("how_to/your_own") if "COMPONENT" in one]
-    place = {}
-    exec(compile(script, "drag.py", "exec"), place)
-    made = place["COMPONENT"]
-    assert made.fault == ""
+def test_the_components_of_the_page_are_such():
+    found = []
+    for script in examples("how_to/your_own"):
+        if "COMPONENT" in script:
+            place = {}
+            exec(compile(script, "own.py", "exec"), place)
+            found.append(place["COMPONENT"])
+    made, hertz = found
+    assert made.fault == hertz.fault == ""
     par, moving = SimpleNamespace(drag_coefficient=5.0), SimpleNamespace(v_p=2.0)
     push = getattr(made.on_piston, "py_func", made.on_piston)
     assert push(par, moving, 1e-6) == -10.0
+    # f(1) = 1, f' and the integral of f at 2 by differences
+    loading = getattr(hertz.loading, "py_func", hertz.loading)
+    (low, _, before), (_, slope, _), (high, _, behind) = (
+        loading(None, x) for x in (1.999, 2, 2.001)
+    )
+    assert loading(None, 1.0)[0] == 1.0
+    assert slope == pytest.approx((high - low) / 2e-3, rel=1e-6)
+    assert loading(None, 2.0)[0] == pytest.approx((behind - before) / 2e-3, rel=1e-6)
