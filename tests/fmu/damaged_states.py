@@ -56,6 +56,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "NumbaHammer": {},
     "NumbaRigidHammer": {},
     **{name: {} for name in PARTS},
+    "WaveString": {"communication_step": STEP, "start.rods": 12},  # takes no other
     "DrillString/lumped": {"model": 2, "rod.automatic": True},
     "Supply/air": {"medium": "air"},
 }
@@ -225,7 +226,8 @@ class Case:
         rng = random.Random(f"{name}:{seed}")
         for _ in range(12):
             for _ in range(rng.randrange(1, 12)):
-                self.instance.step(rng.uniform(1e-6, 0.01))
+                step = rng.uniform(1e-6, 0.01)
+                self.instance.step(STEP if name == "WaveString" else step)
             self.places.append((self.instance.save(), self.instance.time))
         self.running = self.places[2:]
         self.damager = Damager(rng, self.places, foreign)
