@@ -96,11 +96,11 @@ def test_one_peak_keeps_q_and_tells_gamma_there():
         fit = fit_rock(SCENE.replace(**{UNLOADING: q}), given)
         assert UNLOADING not in fit.estimates
         (note,) = (text for text in fit.warnings if text.startswith("q = "))
-        assert note.startswith(f"q = {q:g} kept: peaks of about one force do not tell it")
+        assert note.startswith(f"q = {q:g} kept: peaks of about one force do not determine it")
         assert any(text.startswith("P_0 = 0.001 m kept") for text in fit.warnings)
         shares = [given_back(one, DEPTH) for one in (fit.changes() | {UNLOADING: q}, POWER_TRUTH)]
         assert shares[0] == pytest.approx(shares[1], rel=0.005)
-    with pytest.raises(FitError, match=f"{UNLOADING}: peaks of about one force do not tell it"):
+    with pytest.raises(FitError, match=f"{UNLOADING}: peaks of about one force do not determine it"):
         fit_rock(SCENE, curves, parameters=[RATIO, UNLOADING])
 
 

@@ -22,6 +22,8 @@ from percussion_model.physics.kernel import LEAST_DIVISOR, inlined, kernel
 FREE = 0
 # A mean force lasts so many steps while the bit flies or rests.
 CALM = 8.0
+# Shares of mass by the square of the longest hold, and by it, up to which a held push is stable.
+SOFT, SLACK = 0.05, 0.1
 # A bit slower than this is calm [m/s].
 SLOW = 0.05
 # Slower, piston and bit do not meet soon [m/s].
@@ -38,9 +40,34 @@ DEGREES, ROUNDING, EARLY = 8, 1e-9, 1e-3
 
 
 @inlined
+def longest(par):
+    """Time for which the push is held at most [s]."""
+    return CALM * par.shoulder_step
+
+
+@inlined
+def lighter(par):
+    """Mass of casing or bit [kg]."""
+    return min(par.shoulder_casing_mass, par.mass_b)
+
+
+@inlined
+def stiffness(par):
+    """Stiffness that holds can bear [N/m]: a push that is late gives back more than it took."""
+    most = SOFT * lighter(par) / (longest(par) * longest(par))
+    return min(par.shoulder_stiffness, most)
+
+
+@inlined
+def damping(par):
+    """Damping that holds can bear [N s/m]."""
+    return min(par.shoulder_damping, SLACK * lighter(par) / longest(par))
+
+
+@inlined
 def squeeze(par, s):
     """Compression of the shoulder [m]; negative where it has lifted off."""
-    start = par.shoulder_start_force / par.shoulder_stiffness
+    start = par.shoulder_start_force / stiffness(par)
     return start + s.shoulder_position - (s.path_b - s.climb)
 
 
@@ -49,7 +76,7 @@ def push_by(par, squeezed, speed):
     """Push of a shoulder that is compressed by a length, and more so at a speed [N]."""
     if squeezed <= 0.0:
         return 0.0
-    return max(par.shoulder_stiffness * squeezed + par.shoulder_damping * speed, 0.0)
+    return max(stiffness(par) * squeezed + damping(par) * speed, 0.0)
 
 
 @inlined
@@ -66,7 +93,7 @@ def lasts(par, s):
     step = par.shoulder_step
     if s.closed == 1 or (s.mode != FREE and abs(s.v_b) > SLOW):
         return step
-    return min(max(s.gap / max(s.v_p - s.v_b, BOUNCE), step), CALM * step)
+    return min(max(s.gap / max(s.v_p - s.v_b, BOUNCE), step), longest(par))
 
 
 class Powers(NamedTuple):
@@ -252,7 +279,7 @@ def follow(par, s, h):
         s.shoulder_over = 0.0
     recoil, before = s.i_drive + s.i_on_bit, s.shoulder_squeeze
     if s.shoulder_returned_until == 0.0:
-        before = par.shoulder_start_force / par.shoulder_stiffness
+        before = par.shoulder_start_force / stiffness(par)
     s.shoulder_push = s.f_shoulder_bit
     force = s.feed + par.shoulder_casing_mass * par.gravity
     force -= (recoil - s.shoulder_recoil) / h + s.shoulder_push
@@ -294,8 +321,15 @@ COMPONENT = Component(
     "a casing that takes the feed or the waves of a rod, and whose shoulder pushes the bit",
     {
         "casing_mass": (40.0, "kg", "mass of the casing", 1e-3, 1e5),
-        "stiffness": (1e5, "N/m", "stiffness of shoulder, chuck and damper", 1e3, 1e10),
-        "damping": (200.0, "N s/m", "damping of the same", 0.0, 1e7),
+        "stiffness": (
+            1e5,
+            "N/m",
+            "stiffness of shoulder, chuck and damper; at most m/(20 h^2) counts, with the lighter "
+            "of casing and bit and h of eight steps",
+            1e3,
+            1e10,
+        ),
+        "damping": (200.0, "N s/m", "damping of the same; at most m/(10 h) counts", 0.0, 1e7),
         "start_force": (2500.0, "N", "push of the shoulder on the bit at the start", 0.0, 1e7),
         "impedance": (0.0, "N s/m", "impedance of the rod on the casing; 0: none", 0.0, 1e9),
         "wave_begin": (0.0, "s", "when the step of the rod began whose wave is given", 0.0, 1e9),

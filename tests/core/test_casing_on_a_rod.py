@@ -22,7 +22,7 @@ def casing(**values):
     """A casing that no shoulder holds back."""
     par, s = np.zeros(1, RIGID_PAR)[0], np.zeros(1, RIGID_STATE)[0]
     par["shoulder_casing_mass"], s["shoulder_impedance"] = MASS, IMPEDANCE
-    par["shoulder_stiffness"] = 1.0
+    par["shoulder_stiffness"], par["shoulder_step"], par["mass_b"] = 1.0, 2e-5, 8.69
     s["shoulder_wave_span"], s["feed"] = SPAN, FORCE
     for name, value in values.items():
         s[name] = value

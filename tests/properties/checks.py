@@ -315,7 +315,8 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
     stiffness, way = rounded_places(watch.simulation)
     rounding = stiffness * way * (watch.simulation.solver.time_step or 0.0)
     # feed on the casing reaches the bit less the recoil of the last blow
-    if "feed_force" not in case.changes and not has_casing(scene):
+    passed_on = has_casing(scene) or scene["effects.shoulder"]
+    if "feed_force" not in case.changes and not passed_on:
         push = feed + m_b * weight
         parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), -push * t, -contact, rock)
         parts += (drive - recoil,)

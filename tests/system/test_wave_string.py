@@ -140,6 +140,7 @@ def test_no_passive_partner_shakes_the_casing():
         )
         par["shoulder_stiffness"], par["shoulder_damping"] = 10 ** rng.uniform(4, 6), 200.0
         par["shoulder_start_force"], s["shoulder_wave_span"] = 5e3, span
+        par["shoulder_step"], par["mass_b"] = 2e-5, 10 ** rng.uniform(0.5, 1.5)
         s["shoulder_velocity"] = 1.0
         partner, down, most = Partner(rng, span, impedance), NOTHING, 0.0
         start = 0.5 * par["shoulder_casing_mass"]
