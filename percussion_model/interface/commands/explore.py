@@ -49,9 +49,7 @@ def explore(
     except NoCompilerError as error:
         is_old = (FOLDER / "table.json").is_file()
         what = "is of other sources" * is_old or "is not there"
-        clone = '; in a clone: .venv/bin/pip install -e ".[native]"'
-        said = f"no page: the engine in {FOLDER} {what}: {error}{clone}"
-        raise common.refusal(said) from None
+        raise common.refusal(f"no page: the engine in {FOLDER} {what}: {error}") from None
     if own is not None or out is not None:
         text = file.read_text("utf-8")
         # a browser reads it after this command has ended
