@@ -100,7 +100,9 @@ def test_one_peak_keeps_q_and_tells_gamma_there():
         assert any(text.startswith("P_0 = 0.001 m kept") for text in fit.warnings)
         shares = [given_back(one, DEPTH) for one in (fit.changes() | {UNLOADING: q}, POWER_TRUTH)]
         assert shares[0] == pytest.approx(shares[1], rel=0.005)
-    with pytest.raises(FitError, match=f"{UNLOADING}: peaks of about one force do not determine it"):
+    with pytest.raises(
+        FitError, match=f"{UNLOADING}: peaks of about one force do not determine it"
+    ):
         fit_rock(SCENE, curves, parameters=[RATIO, UNLOADING])
 
 
