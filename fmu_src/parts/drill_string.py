@@ -32,8 +32,6 @@ SHARE_OF_MASS = 0.1
 ROUNDING = 1e-9
 # Implicit midpoint is stable at any step, but blind to what is faster [s].
 LONGEST_LUMPED_STEP = 2e-3
-# A saved string of more rods is refused: their lumps would need matrices of this size squared.
-MOST_RODS = 2000
 
 
 class DrillString(TakesRods, Model):
@@ -223,12 +221,8 @@ class DrillString(TakesRods, Model):
 
     def state_fault(self, saved: Mapping[str, Any]) -> str:
         """As in `Model`: the number of rods, what is divided by, and a lag within a cell."""
-        body, count = saved["body"], saved["body"]["count"]
-        if type(count) is not int or not 1 <= count <= MOST_RODS:
-            return f"{count!r} rods, which must be 1 to {MOST_RODS}"
-        for name, length in self.body.lengths(count).items():
-            if len(body[name]) != length:
-                return f"{len(body[name])} numbers in {name}, which must be {length}"
+        if fault := self.rods_fault(saved):
+            return fault
         if not saved["stiffness"] > 0.0:
             return f"stiffness = {saved['stiffness']!r}, which must be above 0 N/m"
         if not 0.0 <= saved["lag"] <= self.body.step:

@@ -7,9 +7,13 @@ displacements and velocities of the two ends. Weight and wall friction act on th
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+
+# A saved string of more rods is refused: their lumps would need matrices of this size squared.
+MOST_RODS = 2000
 
 
 class Rods:
@@ -54,6 +58,12 @@ class Rods:
         self.head = self.casing = self.head_velocity = self.casing_velocity = 0.0
         self.friction_loss = self.weight_work = self.lost_momentum = 0.0
 
+    def divide(self, cells: int) -> None:
+        """Divide each rod into so many cells, which waves cross in `step` [s]."""
+        self.cells_of_rod, self.cell = cells, self.length_of_rod / cells
+        self.step = self.cell / self.speed
+        self.cell_mass = self.density * self.area * self.cell
+
     def apply_friction(self, v: np.ndarray, mass: float, length: float, step: float) -> np.ndarray:
         """Velocities after a step of wall friction on pieces of a mass and a length.
 
@@ -96,6 +106,16 @@ class TakesRods:
     was_asked: bool
     brought_energy: float
     brought_momentum: float
+
+    def rods_fault(self, saved: Mapping[str, Any]) -> str:
+        """What is wrong with the rods of a state from outside; empty if nothing is."""
+        body, count = saved["body"], saved["body"]["count"]
+        if type(count) is not int or not 1 <= count <= MOST_RODS:
+            return f"{count!r} rods, which must be 1 to {MOST_RODS}"
+        for name, length in self.body.lengths(count).items():
+            if len(body[name]) != length:
+                return f"{len(body[name])} numbers in {name}, which must be {length}"
+        return ""
 
     def _add_rods(self, asked: bool) -> None:
         """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""

@@ -85,10 +85,7 @@ class Packets(Rods):
 
     def __init__(self, parameters: dict[str, Any], count: int) -> None:
         super().__init__(parameters, count)
-        self.cells_of_rod = int(parameters["rod.cells"])
-        self.cell = self.length_of_rod / self.cells_of_rod
-        self.step = self.cell / self.speed
-        self.cell_mass = self.density * self.area * self.cell
+        self.divide(int(parameters["rod.cells"]))
         self.down, self.up = np.zeros((2, count * self.cells_of_rod, DEGREES))
         # what weight adds to a wave that leaves within a transit time, until then and after
         gain = 0.25 * self.gravity * self.step

@@ -33,10 +33,7 @@ class Waves(Rods):
 
     def __init__(self, parameters: dict[str, Any], count: int) -> None:
         super().__init__(parameters, count)
-        self.cells_of_rod = int(parameters["rod.cells"])
-        self.cell = self.length_of_rod / self.cells_of_rod
-        self.step = self.cell / self.speed
-        self.cell_mass = self.density * self.area * self.cell
+        self.divide(int(parameters["rod.cells"]))
         self.total = 0.0  # of the waves
         self.ring = np.zeros(2 * count * self.cells_of_rod)
         # share of a velocity that viscous friction leaves in a step

@@ -20,8 +20,6 @@ from fmu_src.parts.string_packets import DEGREES, Packet, Packets, projected
 
 # A time this close to another, by the step, is that.
 ROUNDING = 1e-9
-# A saved string of more rods is refused.
-MOST_RODS = 2000
 _DOWN = tuple(f"wave_{k + 1}" for k in range(DEGREES))
 _UP = tuple(f"returned_{k + 1}" for k in range(DEGREES))
 
@@ -63,7 +61,7 @@ class WaveString(TakesRods, Model):
         self.body = Packets(parameters, int(parameters["start.rods"]))
         self.was_asked, self.returned, self.wave = False, [], [0.0] * DEGREES
         self.span = parameters["communication_step"]
-        self._free_of(self.body.cells)
+        self._free_of(self.body.cells)  # refuses a step that is too long
 
     def _free_of(self, cells: int) -> int:
         """Lowest cells that give what the hammer needs next whatever it does until then."""
@@ -176,12 +174,8 @@ class WaveString(TakesRods, Model):
 
     def state_fault(self, saved: Mapping[str, Any]) -> str:
         """As in `Model`: the number of rods, and the lengths of what depends on it."""
-        body, count = saved["body"], saved["body"]["count"]
-        if type(count) is not int or not 1 <= count <= MOST_RODS:
-            return f"{count!r} rods, which must be 1 to {MOST_RODS}"
-        for name, length in self.body.lengths(count).items():
-            if len(body[name]) != length:
-                return f"{len(body[name])} numbers in {name}, which must be {length}"
+        if fault := self.rods_fault(saved):
+            return fault
         if len(saved["returned"]) % (1 + DEGREES) or len(saved["wave"]) != DEGREES:
             return "waves of another length"
         return ""
