@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 
 from percussion_model import Scene, Simulation
-from percussion_model.engine import compiler
+from percussion_model.engine import compiler, library
+from percussion_model.engine import solver as solver_module
 from percussion_model.engine.entries import ENTRIES, SOLVERS
 from percussion_model.engine.fault_texts import fault_text
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.library import _exports, module_of
 from percussion_model.engine.platforms import this_platform
-from percussion_model.physics.kernel import kernel
+from percussion_model.physics.kernel import DISABLED, kernel
 from percussion_model.physics.records import SAMPLE_FIELDS
 
 THREADS = 6
@@ -49,6 +50,24 @@ def test_an_edit_concerns_the_solvers_that_import_what_was_edited():
         others = {f"solvers/{one}/advance.py" for one in SOLVERS if one != solver}
         assert not found[solver] & others
         assert not any(name.startswith(("interface/", "analysis/")) for name in found[solver])
+
+
+@pytest.mark.skipif(DISABLED, reason="nothing is compiled")
+@pytest.mark.parametrize("narrower", [1, 2])
+def test_narrower_vectors_have_the_same_bits(narrower, monkeypatch):
+    scene = Scene().computed_by("modal")
+
+    def state():
+        simulation = Simulation(scene)
+        simulation.advance(0.2)
+        return simulation.save().state.words.tolist(), simulation.blows.tobytes()
+
+    wanted = state()
+    file = library._library_file("modal")
+    entries = library._of_library("modal", file, narrower)
+    monkeypatch.setattr(solver_module, "entries_of", lambda name: entries)
+    monkeypatch.setattr(solver_module, "_kept", {})
+    assert state() == wanted
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

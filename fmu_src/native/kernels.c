@@ -25,8 +25,18 @@ DECLARE(_base)
 
 #if defined(HAVE_AVX2_KERNELS) && (defined(__x86_64__) || defined(_M_X64))
 DECLARE(_avx2)
+DECLARE(_avx512)
 
-Kernels kernels_of_machine(void) { return has_avx2() ? KERNELS(_avx2) : KERNELS(_base); }
+Kernels kernels_of_machine(void) {
+    switch (widest_vectors()) {
+    case AVX512:
+        return KERNELS(_avx512);
+    case AVX2:
+        return KERNELS(_avx2);
+    default:
+        return KERNELS(_base);
+    }
+}
 #else
 Kernels kernels_of_machine(void) { return KERNELS(_base); }
 #endif

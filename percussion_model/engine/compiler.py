@@ -46,6 +46,8 @@ Report = Callable[[str, float | None], None]
 # Compiling takes about as long, for the share that is told [s].
 USUAL = {"modal": 72.0, "wave": 35.0, "fem": 37.0, "rigid": 14.0}
 USUAL_ELSE = 10.0
+# Modules with code for AVX-512 as well: that of modes, and that of FMUs which calls it.
+WITH_AVX512 = {"modal", "entries"}
 # What is under way counts for no more than this share, and is looked at so often [s].
 ALMOST, LOOK = 0.95, 1.0
 
@@ -170,19 +172,32 @@ def _folder_of(module: str, kept: Path) -> Path:
     return kept / f"{module.rpartition('.')[2]}-{stamp_of(module)}"
 
 
-def _names(platform: str) -> list[str]:
-    """Files of objects for a platform."""
-    suffixes = ("_base", "_avx2") if platform.startswith("x86_64") else ("_base",)
-    return [f"{platform}{suffix}.o" for suffix in suffixes]
+def suffixes_of(module: str, platform: str) -> tuple[str, ...]:
+    """What files and entries of a module end with, for each kind of processor of a platform."""
+    if not platform.startswith("x86_64"):
+        return ("_base",)
+    wide = module.rpartition(".")[2] in WITH_AVX512
+    return ("_base", "_avx2", *["_avx512"] * wide)
+
+
+def _names(module: str, platform: str) -> list[str]:
+    """Files of a module's objects for a platform."""
+    return [f"{platform}{suffix}.o" for suffix in suffixes_of(module, platform)]
+
+
+def definitions(parts: Iterable[Path]) -> list[str]:
+    """What a C compiler is told of the processors for which there are objects."""
+    kinds = {one.stem.rpartition("_")[2] for one in parts}
+    return [f"-DHAVE_{kind.upper()}_KERNELS" for kind in ("avx2", "avx512") if kind in kinds]
 
 
 def missing(modules: Iterable[str], platforms: Sequence[str]) -> list[str]:
     """Modules of which some objects have yet to be made."""
     kept = kept_folder()
-    names = [name for platform in platforms for name in _names(platform)]
     return [
         module
         for module in modules
+        for names in [[name for platform in platforms for name in _names(module, platform)]]
         if not all((_folder_of(module, kept) / name).is_file() for name in names)
     ]
 
@@ -223,7 +238,7 @@ def objects(
             _make(missing(modules, platforms), platforms, kept, report)
     return {
         platform: [
-            _folder_of(module, kept) / name for module in modules for name in _names(platform)
+            _folder_of(module, kept) / name for module in modules for name in _names(module, platform)
         ]
         for platform in platforms
     }  # fmt: skip
@@ -362,8 +377,7 @@ def link(
     """
     parts = list(parts)
     given = [*FLAGS, f"-I{HERE}", *flags]
-    if any(one.stem.endswith("_avx2") for one in parts):
-        given.append("-DHAVE_AVX2_KERNELS")
+    given += definitions(parts)
     if name == WASM:
         given.remove("-shared")  # it would need a loader
     elif "windows" not in name:

@@ -9,7 +9,7 @@ const WORD = 8, FACTS = 4, SAMPLES = 512, EVENTS = 1024, BLOWS = 64, ADVANCE = 0
 const ONES = -1;
 
 // As in analysis/stationary.py, which tells why.
-const FEWEST_SCATTERED = 100, NEXT_CHECK = 1.25, SETTLING_SHARE = 0.2, MOTOR_SETTLES = 10;
+const FEWEST_SCATTERED = 64, NEXT_CHECK = 1.1, SETTLING_SHARE = 0.2, MOTOR_SETTLES = 10;
 const RATE_SO_FAR = ["hole_advance", "period", [1 / 8, 1 / 4, 1 / 2], 3];
 
 export class EngineError extends Error {}

@@ -37,7 +37,7 @@ def module_of(solver: str) -> str:
 def stamp() -> str:
     """Hash of the sources of all solvers."""
     files = (file for name in FOLDERS for file in (compiler.PACKAGE / name).rglob("*.py"))
-    return compiler.hash_of([*sorted(files), compiler.HERE / "memory.c"])
+    return compiler.hash_of([*sorted(files), *(compiler.HERE / name for name in ("memory.c", "processor.h"))])
 
 
 def brought_file(solver: str, platform: str) -> Path:
@@ -147,10 +147,11 @@ def _functions(solver: str, suffix: str, address_of: Callable[[str], int]) -> Si
     return found
 
 
-def _of_library(solver: str, file: Path) -> SimpleNamespace:
+def _of_library(solver: str, file: Path, narrower: int = 0) -> SimpleNamespace:
+    """Entries for the widest vectors of this processor, or for some that are narrower."""
     library = ctypes.PyDLL(str(file))
-    library.engine_has_avx2.restype = ctypes.c_int64
-    suffix = "_avx2" if library.engine_has_avx2() else "_base"
+    library.engine_vectors.restype = ctypes.c_int64
+    suffix = ("_base", "_avx2", "_avx512")[max(library.engine_vectors() - narrower, 0)]
 
     def address_of(name: str) -> int:
         return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0

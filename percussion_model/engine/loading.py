@@ -13,6 +13,10 @@ from numba.core.runtime import _nrt_python
 
 from percussion_model.engine import plain_memory
 
+# Features of a processor without which it cannot run a kind of objects, or not well (processor.h).
+AVX2 = ("avx2", "bmi", "bmi2")
+AVX512 = (*AVX2, "avx512f", "avx512dq", "avx512cd", "avx512bw", "avx512vl", "avx512vbmi2")
+NEEDED = {"_avx2": AVX2, "_avx512": AVX512}
 _kept: list[Any] = []  # what must live as long as the process
 
 
@@ -37,7 +41,7 @@ def load_objects(
     Parameters
     ----------
     files : sequence of Path
-        For a plain processor and, perhaps, for one with AVX2.
+        For a plain processor and, perhaps, for those with wider vectors.
 
     Returns
     -------
@@ -51,9 +55,10 @@ def load_objects(
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     _tell_of_memory()
-    features = llvm.get_host_cpu_features()
-    wide = all(features.get(name, False) for name in ("avx2", "bmi", "bmi2"))
-    suffix = "_avx2" if wide and any("_avx2" in one.name for one in files) else "_base"
+    features, suffix = llvm.get_host_cpu_features(), "_base"
+    for kind, needed in NEEDED.items():
+        if all(features.get(name, False) for name in needed):
+            suffix = next((kind for one in files if one.stem.endswith(kind)), suffix)
     machine = llvm.Target.from_default_triple().create_target_machine()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     for file in files:

@@ -33,7 +33,7 @@ typedef struct {
 
 EXPORTED int64_t native_allocate(int64_t size);
 EXPORTED void native_free(int64_t memory);
-EXPORTED int64_t engine_has_avx2(void);
+EXPORTED int64_t engine_vectors(void);
 void *NRT_Allocate(uint64_t size);
 void NRT_Free(void *data);
 Array *NRT_MemInfo_alloc(uint64_t size);
@@ -61,7 +61,7 @@ void native_free(int64_t memory) {
     free(whole);
 }
 
-int64_t engine_has_avx2(void) { return has_avx2(); }
+int64_t engine_vectors(void) { return widest_vectors(); }
 
 Array *NRT_MemInfo_alloc_aligned(uint64_t size, unsigned align) {
     if (size > SIZE_MAX / 2) {

@@ -15,7 +15,7 @@ from fmpy import extract, read_model_description
 
 from fmu_src.native.library import ENGINE, HERE, MODULES, libraries
 from percussion_model import Scene
-from percussion_model.engine.compiler import FLAGS, objects
+from percussion_model.engine.compiler import FLAGS, definitions, objects
 from percussion_model.engine.platforms import PLATFORMS, this_platform
 from tests.native import shell_build as build
 from tests.native.test_native_fmu import SCENES, SOLVERS
@@ -133,10 +133,9 @@ def test_sanitizers_see_nothing(unpack, tmp_path):
     """In the shell, with the real kernels."""
     parts = objects(MODULES, [this_platform()])[this_platform()]
     library = tmp_path / "checked.so"
-    defined = ("-DHAVE_AVX2_KERNELS",) if any("_avx2" in one.name for one in parts) else ()
     sources = [*map(str, sorted(HERE.glob("*.c"))), str(ENGINE / "memory.c"), *map(str, parts)]
     subprocess.run(
-        [build.COMPILER, *FLAGS, *build.SANITIZERS, *defined, "-fPIC", f"-I{HERE}",
+        [build.COMPILER, *FLAGS, *build.SANITIZERS, *definitions(parts), "-fPIC", f"-I{HERE}",
          f"-I{ENGINE}", f"-isystem{build.HEADERS}", *sources, "-lm", "-o", str(library)],
         check=True,
     )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import operator
-from functools import partial
 
 from llvmlite import ir
 from numba import types
@@ -98,11 +97,6 @@ def _fold(builder, lanes, join):
     return builder.extract_element(part, ir.Constant(ir.IntType(32), 0))
 
 
-def _pick_lower(builder, one, other):
-    """The lower number of each two."""
-    return builder.select(builder.fcmp_ordered("<", one, other), one, other)
-
-
 def total(typing, lanes):
     """Sum of eight numbers."""
 
@@ -150,22 +144,31 @@ def totals(typing, one, other):
     return pair(_lanes, _lanes), generate
 
 
-def lower_of(typing, one, other):
-    """The lower one of each two numbers."""
+def _picked(comparison):
+    """Instruction that picks one of each two numbers."""
+
+    def pick(typing, one, other):
+        def generate(context, builder, signature, args):
+            return builder.select(builder.fcmp_ordered(comparison, *args), *args)
+
+        return _lanes(_lanes, _lanes), generate
+
+    return pick
+
+
+lower_of, higher_of = _picked("<"), _picked(">")
+
+
+def root(typing, lanes):
+    """Square roots."""
 
     def generate(context, builder, signature, args):
-        return _pick_lower(builder, *args)
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), f"llvm.sqrt.v{WIDTH}f64"
+        )
+        return builder.call(function, args)
 
-    return _lanes(_lanes, _lanes), generate
-
-
-def lowest(typing, lanes):
-    """The lowest of eight numbers."""
-
-    def generate(context, builder, signature, args):
-        return _fold(builder, args[0], partial(_pick_lower, builder))
-
-    return types.float64(_lanes), generate
+    return _lanes(_lanes), generate
 
 
 def from_front(typing, index):
@@ -203,5 +206,6 @@ for _function, _instruction in (
     (operator.add, "fadd"),
     (operator.sub, "fsub"),
     (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
 ):
     _lower(_function, _instruction)

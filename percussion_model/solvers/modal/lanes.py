@@ -47,9 +47,14 @@ def lower_of(one, other):
     return np.minimum(one, other)
 
 
-def lowest(lanes):
-    """The lowest of eight numbers."""
-    return float(lanes.min())
+def higher_of(one, other):
+    """The higher one of each two numbers."""
+    return np.maximum(one, other)
+
+
+def root(lanes):
+    """Square roots."""
+    return np.sqrt(lanes)
 
 
 def from_front(index):
@@ -61,7 +66,7 @@ def _teach():
     from percussion_model.physics.compiling import instruct
     from percussion_model.solvers.modal import lane_types
 
-    for function in (load, store, spread, total, totals, lower_of, lowest, from_front):
+    for function in (load, store, spread, total, totals, lower_of, higher_of, root, from_front):
         instruct(function, getattr(lane_types, function.__name__))
 
 

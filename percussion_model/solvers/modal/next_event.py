@@ -35,7 +35,16 @@ from percussion_model.solvers.modal.ends import (
     top_between,
     turns_between,
 )
-from percussion_model.solvers.modal.lanes import WIDTH, load, lower_of, lowest, spread, store, total
+from percussion_model.solvers.modal.lanes import (
+    WIDTH,
+    higher_of,
+    load,
+    lower_of,
+    root,
+    spread,
+    store,
+    total,
+)
 from percussion_model.solvers.modal.pairs import (
     AT,
     BIT,
@@ -65,6 +74,8 @@ SAME_SIDE = 4
 SEEN, SIDE = 2, 6
 # And with what it saw from the look before on, where no piston is near.
 BEFORE = SIDE
+# Share of both velocities that a way is at most beyond both its ends: 4/27, and rounding.
+BEYOND = 0.1482
 # Of looks, in intervals.
 TIMES = np.arange(1.0, SCAN + 1.0).reshape(1, SCAN)
 # 2^SCAN_LEVEL looks at once.
@@ -275,13 +286,13 @@ def most_swing(s, bars, law):
 
     Each pair is an oscillator of its own, so that its V^2 + square Q^2 never grows.
     """
-    ends, K, C, most = bars.laws.ends[s.law], law.stiffness, law.damping, 0.0
-    for k in range(s.pairs):
-        q, v, square = bars.w[AT, k], bars.w[AT + 1, k], ends[SQUARE, k]
-        by_q = K * ends[LOW, k] + C * ends[SPEED, k]
-        by_v = K * ends[LOW + 1, k] + C * ends[SPEED + 1, k]
-        most += math.sqrt((by_q * by_q + square * by_v * by_v) * (q * q + v * v / square))
-    return most
+    ends, K, C, most = bars.laws.ends[s.law], law.stiffness, law.damping, spread(0.0)
+    for k in range(0, s.pairs, WIDTH):
+        q, v, square = load(bars.w, AT, k), load(bars.w, AT + 1, k), load(ends, SQUARE, k)
+        by_q = load(ends, LOW, k) * K + load(ends, SPEED, k) * C
+        by_v = load(ends, LOW + 1, k) * K + load(ends, SPEED + 1, k) * C
+        most = most + root((by_q * by_q + square * by_v * by_v) * (q * q + v * v / square))
+    return total(most)
 
 
 class Quiet(NamedTuple):
@@ -397,12 +408,33 @@ def touches_on(par, s, touch, speed, h, time):
 @inlined
 def magnitude(lanes):
     """Absolute values."""
-    return lower_of(lanes, lanes * -1.0) * -1.0
+    return higher_of(lanes, lanes * -1.0)
 
 
 @inlined
-def stands_on(s, bars, law, h, last, most):
-    """Whether a standstill plainly goes on through a whole scan, with no force that counts.
+def room_of_flight(s, p, p_before, both):
+    """How far the rock is, at least: a cubic is at most 4/27 of both slopes beyond its ends."""
+    return lower_of(p * -1.0, p_before * -1.0) + (s.p_u - both * BEYOND)
+
+
+@inlined
+def room_of_way(s, p, p_before, v, v_before, h):
+    """Above zero where the rock end goes on in its way, down or up, from look to look."""
+    sign = -1.0 if s.mode == Mode.BC else 1.0
+    first, last = v_before * (sign * h), v * (sign * h)
+    bend = (first + last - (p - p_before) * (2.0 * sign)) * 3.0
+    slope = last - first - bend
+    # a parabola that bends upwards has its least value above zero
+    turn = higher_of(bend * first * 4.0 - slope * slope, bend * -1.0)
+    room = lower_of(lower_of(first, last), turn)
+    if s.mode == Mode.BC:
+        room = lower_of(room, lower_of(p, p_before) - s.p_u)
+    return room
+
+
+@inlined
+def plainly_kept(s, bars, law, h, last, most, spare):
+    """How many looks of a whole scan the mode plainly goes on, with no force that counts.
 
     From one look to the next the velocity is a parabola: in either half it is no further from
     the nearer look's than 1.5 times its mean and both its ends together, nor from zero.
@@ -415,20 +447,45 @@ def stands_on(s, bars, law, h, last, most):
         The rock end where the search is.
     most : float
         Force from which on it counts [N].
+    spare : float
+        What the dashpot may take by the looks before it may be enough [J].
+
+    Returns
+    -------
+    kept : int
+    taken : float
+        By the dashpot, by the looks that are kept [J].
     """
-    K, C, rows = law.stiffness, law.damping, bars.rows
+    K, C, rows, work = law.stiffness, law.damping, bars.rows, 0.0
     rows[BEFORE, 0], rows[BEFORE + 1, 0], t = last.p, last.speed, load(TIMES, 0, 0)
     p = load(rows, SEEN, 0) + (s.p + (s.rest_low - s.low)) + t * t * (0.5 * law.pull * h * h)
     v = load(rows, SEEN + 1, 0) + t * (law.pull * h)
     store(rows, BEFORE, 1, p)
     store(rows, BEFORE + 1, 1, v)
     p_before, v_before = load(rows, BEFORE, 0), load(rows, BEFORE + 1, 0)
-    way = magnitude(p - p_before) * 1.5 + (magnitude(v) + magnitude(v_before)) * h
-    reach = way * (K + C / h)
-    force, before = p * K + v * C, p_before * K + v_before * C
-    low = lower_of(force, before) - reach
-    high = lower_of(force * -1.0, before * -1.0) - reach
-    return lowest(low) > K * law.origin and -lowest(high) < most + K * law.origin
+    both = (magnitude(v) + magnitude(v_before)) * h
+    if s.mode == Mode.FF:
+        room = room_of_flight(s, p, p_before, both)
+    else:
+        reach = (magnitude(p - p_before) * 1.5 + both) * (K + C / h)
+        force, before = p * K + v * C, p_before * K + v_before * C
+        room = lower_of(force * -1.0, before * -1.0) - reach + (most + K * law.origin)
+        if s.mode == Mode.SS:
+            room = lower_of(room, lower_of(force, before) - reach - K * law.origin)
+        else:
+            room = lower_of(room, room_of_way(s, p, p_before, v, v_before, h))
+    store(rows, BEFORE, 0, room)
+    if s.mode == Mode.DFC:
+        share = (v * v + v_before * v_before) * (0.5 * C * h)
+        if not total(share) < spare:
+            return 0, 0.0
+        store(rows, BEFORE + 1, 0, share)
+    kept = 0
+    while kept < SCAN and rows[BEFORE, kept] > 0.0:
+        if s.mode == Mode.DFC:
+            work += rows[BEFORE + 1, kept]
+        kept += 1
+    return kept, work
 
 
 @inlined
@@ -451,14 +508,16 @@ def look_through(par, s, bars, law, beside, ticks, level, count, taken, sampled,
     h, kept, near, then, peak, late = par.tick * (1 << level), 0, False, last, 0.0, 0.0
     since, blocked, speed_p = par.tick * ticks, False, 0.0
     begin = time_of(par, s) + since
-    if count == SCAN and s.mode == Mode.SS and not beside.near:
+    if count == SCAN and not beside.near and (s.mode == Mode.FF or is_crushable(par)):
         most = s.b_peak_bit
         if begin + SCAN * h > s.peak_from:
             most = min(most, s.peak_bit_force)
-        if stands_on(s, bars, law, h, last, most):
-            low, speed = bars.rows[SEEN, SCAN - 1], bars.rows[SEEN + 1, SCAN - 1]
-            then = end_at(s, law, low, speed, h * SCAN)
-            return Seen(SCAN, False, False, sampled, then, then, 0.0, 0.0, touch)
+        spare = (s.w_r - s.w - taken) / UNSURE - sampled
+        kept, work = plainly_kept(s, bars, law, h, last, most, spare)
+        sampled += work
+        if kept > 0:
+            low, speed = bars.rows[SEEN, kept - 1], bars.rows[SEEN + 1, kept - 1]
+            last = then = end_at(s, law, low, speed, h * kept)
     while kept < count:
         if beside.near:
             t, apart = h * (kept + 1), beside.room

@@ -167,11 +167,19 @@ def move_pairs(s, bars, x, first, level):
 @kernel
 def carry_pairs(s, bars, x, first, ticks):
     """Move pairs in two rows of `x` from `first` on over any number of ticks."""
-    level = 0
-    while ticks >> level > 0:
-        if (ticks >> level) & 1 == 1:
-            move_pairs(s, bars, x, first, level)
-        level += 1
+    moves, w = bars.laws.move[s.law], bars.w
+    for k in range(0, s.pairs, WIDTH):
+        q, v, f = load(x, first, k), load(x, first + 1, k), load(w, PLOAD, k)
+        level, rest = 0, ticks
+        while rest > 0:
+            if rest & 1 == 1:
+                m = moves[level]
+                ahead = load(m, QQ, k) * q + load(m, QV, k) * v + load(m, YIELD, k) * f
+                v = load(m, VQ, k) * q + load(m, VV, k) * v + load(m, QV, k) * f
+                q = ahead
+            level, rest = level + 1, rest >> 1
+        store(x, first, k, q)
+        store(x, first + 1, k, v)
 
 
 @inlined
