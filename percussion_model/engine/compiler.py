@@ -238,7 +238,7 @@ def objects(
             _make(missing(modules, platforms), platforms, kept, report)
     return {
         platform: [
-            _folder_of(module, kept) / name for module in modules for name in _names(module, platform)
+            _folder_of(one, kept) / name for one in modules for name in _names(one, platform)
         ]
         for platform in platforms
     }  # fmt: skip

@@ -37,7 +37,9 @@ def module_of(solver: str) -> str:
 def stamp() -> str:
     """Hash of the sources of all solvers."""
     files = (file for name in FOLDERS for file in (compiler.PACKAGE / name).rglob("*.py"))
-    return compiler.hash_of([*sorted(files), *(compiler.HERE / name for name in ("memory.c", "processor.h"))])
+    return compiler.hash_of(
+        [*sorted(files), *(compiler.HERE / name for name in ("memory.c", "processor.h"))]
+    )
 
 
 def brought_file(solver: str, platform: str) -> Path:
