@@ -248,7 +248,8 @@ def check_hole(watch: Watch, seen: dict[str, np.ndarray]) -> None:
 
 def scale_of(ledger: dict[str, float]) -> float:
     """Energy that a run began with, and that forces gave or took [J]."""
-    return ledger["initial"] + sum(abs(ledger[name]) for name in ("drive", "feed", "gravity"))
+    given = max(-ledger["shoulder"], 0.0)
+    return given + ledger["initial"] + sum(abs(ledger[one]) for one in ("drive", "feed", "gravity"))
 
 
 def rounded_places(simulation: Simulation) -> tuple[float, float]:
@@ -293,6 +294,11 @@ def has_casing(scene: Any) -> bool:
     return scene.effects.feed and scene.feed.on == "casing"
 
 
+def has_shoulder(scene: Any) -> bool:
+    """Whether a casing with a shoulder takes the feed."""
+    return bool(scene["effects.shoulder"] and scene.feed.on == "bit" and not scene.effects.damper)
+
+
 def mass_of(simulation: Simulation, bar: str) -> float:
     """Mass of a body [kg]; waves give a section that is shorter than a step that of a step."""
     cells = simulation.solver.grid_of(bar)
@@ -315,13 +321,23 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
     stiffness, way = rounded_places(watch.simulation)
     rounding = stiffness * way * (watch.simulation.solver.time_step or 0.0)
     # feed on the casing reaches the bit less the recoil of the last blow
-    passed_on = has_casing(scene) or scene["effects.shoulder"]
+    passed_on = has_casing(scene) or has_shoulder(scene)
     if "feed_force" not in case.changes and not passed_on:
         push = feed + m_b * weight
         parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), -push * t, -contact, rock)
         parts += (drive - recoil,)
         scale = max(m_b * np.abs(seen["bit_velocity"]).max(), rounding / MOST_MOMENTUM)
         check_sum(parts, scale, abs(push) * late, "bit")
+    changed = any(name == "feed_force" or name.startswith("shoulder") for name in case.changes)
+    if has_shoulder(scene) and not changed:
+        # what the casing loses, the bit gets
+        mass, v = scene["shoulder.casing_mass"], seen["shoulder_velocity"]
+        rod = scene["shoulder.impedance"] * seen["shoulder_position"]
+        push = feed + (mass + m_b) * weight
+        parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), mass * v, rod)
+        parts += (-push * t, -contact, rock, drive)
+        scale = max(m_b * np.abs(seen["bit_velocity"]).max(), rounding / MOST_MOMENTUM)
+        check_sum(parts, scale, abs(push) * late, "bit and casing")
     if scene.piston.model != "absent":
         push = m_p * weight
         parts = (m_p * (seen["piston_velocity"] - seen["piston_velocity"][0]), -push * t)
