@@ -144,10 +144,12 @@ class Component(NamedTuple):
     @property
     def ledger(self) -> dict[str, tuple[Side, str]]:
         """Entries of the ledger, that of its force before others: side and meaning by name."""
-        taken = f"taken from the {' and the '.join(self.pushes)} by {self.description}"
-        is_own = self.pushes and not self.is_drive
-        side: Side = "stored" if self.stores else "dissipated"
-        of_force = {self.name: (side, taken)} if is_own else {}
+        bodies = " and the ".join(self.pushes)
+        side: Side = "stored" if self.stores else "work" if self.takes_feed else "dissipated"
+        way = "given to" if side == "work" else "taken from"
+        of_force = {self.name: (side, f"{way} the {bodies} by {self.description}")}
+        if self.is_drive or not self.pushes:
+            of_force = {}
         return {**of_force, **self.entries}
 
     @property

@@ -332,13 +332,13 @@ COMPONENT = Component(
         "damping": (200.0, "N s/m", "damping of the same; at most m/(10 h) counts", 0.0, 1e7),
         "start_force": (2500.0, "N", "push of the shoulder on the bit at the start", 0.0, 1e7),
         "impedance": (0.0, "N s/m", "impedance of the rod on the casing; 0: none", 0.0, 1e9),
-        "wave_begin": (0.0, "s", "when the step of the rod began whose wave is given", 0.0, 1e9),
+        "wave_begin": (0.0, "s", "begin of the step whose wave is in wave_1 to wave_8", 0.0, 1e9),
         "wave_span": (1e-3, "s", "length of that step", 1e-9, 1e9),
         **{
             f"wave_{k + 1}": (0.0, "m/s", f"{_part_of_wave(k)} that comes down", -1e4, 1e4)
             for k in range(DEGREES)
         },
-        "step": (2e-5, "s", "for which the push is held at least", 1e-8, 1e-3),
+        "step": (2e-5, "s", "shortest time for which the push is constant", 1e-8, 1e-3),
     },
     on_bit=on_bit,
     state={
@@ -349,8 +349,8 @@ COMPONENT = Component(
             f"returned_{k + 1}": ("m/s", f"{_part_of_wave(k)} that goes up", 0.0)
             for k in range(DEGREES)
         },
-        "returned_begin": ("s", "when the step of the rod began whose wave goes up", 0.0),
-        "returned_until": ("s", "up to which time that is complete", 0.0),
+        "returned_begin": ("s", "begin of the step whose wave is in returned_1 to returned_8", 0.0),
+        "returned_until": ("s", "time up to which the wave that goes up is known", 0.0),
         "rod_work": ("J", "work of the rod on the casing", 0.0),
     },
     pass_time=pass_time,

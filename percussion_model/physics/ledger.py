@@ -25,7 +25,6 @@ STORED = ("kinetic", "elastic", "recoverable", *entries_on("stored"))
 ENERGIES = (*LEDGER_FIELDS, *STORED_FIELDS)
 START_AT, NUMERICAL_AT = ENERGIES.index("start"), ENERGIES.index("numerical")
 WORKS_AT = tuple(map(ENERGIES.index, WORKS))
-TAKEN_AT = tuple(map(ENERGIES.index, entries_on("dissipated")))
 
 
 def energies(reading: np.ndarray) -> dict[str, float]:
@@ -39,8 +38,6 @@ def put_in(energies):
     works = 0.0
     for k in WORKS_AT:
         works += abs(energies[k])
-    for k in TAKEN_AT:  # a shoulder that is pressed at the start gives some
-        works += max(-energies[k], 0.0)
     return abs(energies[START_AT]) + works
 
 

@@ -90,7 +90,7 @@ def _and_force(before: Callable, one: Component, body: str) -> Callable:
 def _and_work(before: Callable, one: Component, body: str) -> Callable:
     if body not in one.pushes:
         return before
-    held, entry, sign = f"f_{one.name}_{body}", f"e_{one.name}", -1.0
+    held, entry, sign = f"f_{one.name}_{body}", f"e_{one.name}", 1.0 if one.takes_feed else -1.0
     if one.is_drive:
         entry, sign = "e_drive", 1.0
 

@@ -248,8 +248,8 @@ def check_hole(watch: Watch, seen: dict[str, np.ndarray]) -> None:
 
 def scale_of(ledger: dict[str, float]) -> float:
     """Energy that a run began with, and that forces gave or took [J]."""
-    given = max(-ledger["shoulder"], 0.0)
-    return given + ledger["initial"] + sum(abs(ledger[one]) for one in ("drive", "feed", "gravity"))
+    works = ("drive", "feed", "gravity", "shoulder")
+    return ledger["initial"] + sum(abs(ledger[name]) for name in works)
 
 
 def rounded_places(simulation: Simulation) -> tuple[float, float]:
@@ -337,7 +337,8 @@ def check_momentum(watch: Watch, seen: dict[str, np.ndarray]) -> None:
         parts = (m_b * (seen["bit_velocity"] - seen["bit_velocity"][0]), mass * v, rod)
         parts += (-push * t, -contact, rock, drive)
         scale = max(m_b * np.abs(seen["bit_velocity"]).max(), rounding / MOST_MOMENTUM)
-        check_sum(parts, scale, abs(push) * late, "bit and casing")
+        held = abs(push) + np.abs(seen["shoulder_push"]).max()
+        check_sum(parts, scale, held * late, "bit and casing")
     if scene.piston.model != "absent":
         push = m_p * weight
         parts = (m_p * (seen["piston_velocity"] - seen["piston_velocity"][0]), -push * t)

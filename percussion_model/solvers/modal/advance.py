@@ -537,6 +537,7 @@ def read_at(par, s, bars, time, row):
             elastic += piston_vibration(bars) - own
     # within a tick forces stay, so that impulses and velocities agree
     rest = max(0.0, time - time_of(par, s))
+    s.i_drive += rest * drive_force(par, s)  # a casing takes its recoil
     pass_time(par, s, rest)
     fill_ledger(s, row, kinetic, elastic, recoverable(par, s))
     fill_motion(par, s, row, time, s.u_p + par.start_gap, s.u_b)
@@ -554,8 +555,6 @@ def read_at(par, s, bars, time, row):
     row.contact_force = s.f_contact
     row.bit_impulse += rest * s.f_rock
     row.contact_impulse += rest * s.f_contact
-    row.drive_impulse += rest * row.drive_force
-    row.recoil_impulse += rest * row.drive_force  # that on the bit has passed with its time
 
 
 @kernel
