@@ -12,6 +12,7 @@ import numpy as np
 
 from percussion_model.physics.judgement import FIRST_ORDER
 from percussion_model.physics.settling import (
+    REQUEST,
     STALLED_AFTER,
     Verdict,
     multiplier_of,
@@ -346,19 +347,21 @@ def settled(
         return found
 
     asked = request_for(tolerance, most_blows, slowest)
+    found = asked.view(REQUEST)[0]
     if scatter:
-        asked[0].enough = FEWEST_SCATTERED
+        found["enough"] = FEWEST_SCATTERED
     while True:
         simulation.settle(asked, progress, began + most_time)
-        found, blows = asked[0], simulation.blows
-        if found.verdict == Verdict.STALLED:
+        blows = simulation.blows
+        if found["verdict"] == Verdict.STALLED:
             return made("stalled", 0, math.nan, math.nan, math.nan)
-        if found.verdict == Verdict.PERIODIC:
-            return made("periodic", int(found.order), found.rate, found.error, found.multiplier)
+        if found["verdict"] == Verdict.PERIODIC:
+            rate, error = float(found["rate"]), float(found["error"])
+            return made("periodic", int(found["order"]), rate, error, float(found["multiplier"]))
         rate, error = rate_so_far(blows)
         if len(blows) >= most_blows or error <= scatter * abs(rate):
             return made("aperiodic", 0, rate, error, math.nan)
-        asked[0].verdict, asked[0].enough = Verdict.OPEN, NEXT_CHECK * len(blows)
+        found["verdict"], found["enough"] = Verdict.OPEN, NEXT_CHECK * len(blows)
 
 
 def _other_motions(

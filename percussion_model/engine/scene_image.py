@@ -8,6 +8,7 @@ the rods, six numbers each; what only an FMU has (`Own`).
 from __future__ import annotations
 
 from enum import IntEnum
+from struct import Struct
 
 import numpy as np
 
@@ -21,6 +22,7 @@ COUNTS = 3  # words before the sections of each rod
 VALUES = SCENE_NUMBERS.itemsize // 8
 SECTION, JOINT = 4, 6
 AT = words_of(SCENE_NUMBERS)
+_WORDS = Struct("=" + "".join("q" if one[1].endswith("i8") else "d" for one in SCENE_NUMBERS.descr))
 # Drives that take a pressure as it is: the choice of `effects.drive`, and the pressure's word.
 PRESSED = tuple(
     (row_of("effects.drive").choices.index(drive), AT[field]) for drive, field in PRESSURES.items()
@@ -50,12 +52,12 @@ def image_of(numbers: Numbers) -> np.ndarray:
         Words, some of which are numbers.
     """
     counts = [len(numbers.piston), len(numbers.bit), len(numbers.rod_counts), *numbers.rod_counts]
-    values = np.array([numbers.values], SCENE_NUMBERS)
+    values = numbers.values
     own = np.zeros(OWN)
-    word = dict(PRESSED).get(int(values[0]["effects_drive"]), AT["drive_force"])
-    own[Own.PRESSURE], own[Own.AREA] = values.view(np.float64)[word], 1.0
+    word = dict(PRESSED).get(int(values.effects_drive), AT["drive_force"])
+    own[Own.PRESSURE], own[Own.AREA] = values[word], 1.0
     own[Own.ON], own[Own.GAUGE_PLACE] = 1.0, -1.0
     rows = (numbers.piston, numbers.bit, numbers.rod_sections, numbers.joints, own)
-    parts = [np.array(counts, np.int64), values.view(np.int64)]
-    parts += [np.ascontiguousarray(one, np.float64).view(np.int64).ravel() for one in rows]
-    return np.concatenate(parts)
+    words = [np.array(counts, np.int64).tobytes(), _WORDS.pack(*values)]
+    words += [np.ascontiguousarray(one, np.float64).tobytes() for one in rows]
+    return np.frombuffer(bytearray(b"".join(words)), np.int64)

@@ -74,6 +74,7 @@ REQUEST = np.dtype(
         ("time", "f8"),  # that the run has reached [s]
     ]
 )
+_REQUEST = np.dtype((np.record, REQUEST))
 
 
 class Cycle(NamedTuple):
@@ -313,7 +314,8 @@ def request_for(tolerance: float, most: int, not_before: float) -> np.ndarray:
     tolerance, most, not_before
         See there.
     """
-    asked = np.zeros(1, np.dtype((np.record, REQUEST)))
-    asked[0].tolerance, asked[0].most, asked[0].not_before = tolerance, most, not_before
-    asked[0].enough = asked[0].until = math.inf
+    asked = np.zeros(1, _REQUEST)
+    one = asked.view(REQUEST)[0]
+    one["tolerance"], one["most"], one["not_before"] = tolerance, most, not_before
+    one["enough"] = one["until"] = math.inf
     return asked

@@ -38,6 +38,12 @@ RATIOS = {
     "net_percussive_power": ("net_energy", "time_on_air"),
     "energy_per_air": ("blow_energy", "air_used"),
 }
+# Columns that are summed up; those that the blow table has as they are, by their word there.
+_SUMMED = tuple(dict.fromkeys((*_MEANS.values(), *(one for two in RATIOS.values() for one in two))))
+_WORD = {column.name: k for k, column in enumerate(BLOW_COLUMNS) if column.kind == "f8"}
+del _WORD["hole_advance"]  # less rounding
+_AS_THEY_ARE = [_WORD.get(name, 0) for name in _SUMMED]
+_MADE = [(k, name) for k, name in enumerate(_SUMMED) if name not in _WORD]
 # The greatest of all blows.
 _GREATEST = ("peak_bit_force", "peak_contact_force")
 # Blows take back less of these than of the advance of the hole, and stretches of a quarter of
@@ -63,6 +69,15 @@ def _column(blows: np.ndarray, name: str) -> np.ndarray:
     return np.asarray(blows[name])
 
 
+def _columns(blows: np.ndarray) -> np.ndarray:
+    """`_SUMMED`, a row for each."""
+    words = np.ascontiguousarray(blows).view(np.float64).reshape(len(blows), len(BLOW_COLUMNS))
+    found = words.T[_AS_THEY_ARE]
+    for k, name in _MADE:
+        found[k] = _column(blows, name)
+    return found
+
+
 def numbers_over(blows: np.ndarray) -> dict[str, float]:
     """Return the numbers over some blows, SI units; NaN is what is not defined.
 
@@ -75,17 +90,17 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     dict of float
         Means, ratios of sums and greatest values, by their names in a summary.
     """
-    found = dict.fromkeys(_MEANS, math.nan)
-    if len(blows):
-        means = np.mean([_column(blows, one) for one in _MEANS.values()], axis=1).tolist()
-        found = dict(zip(_MEANS, means, strict=True))
+    count = len(blows) or math.nan
+    sums = dict(zip(_SUMMED, np.sum(_columns(blows), axis=1).tolist(), strict=True))
+    found = {name: sums[column] / count for name, column in _MEANS.items()}
     for name, column in _MEANS.items():
         if math.isnan(found[name]):
             found[name] = _mean_of_known(blows[column])
     # of a component that is off, all are zero
     found |= {name: math.nan for name in _OF_COMPONENTS if not found[name]}
     found["blow_frequency"] = 1.0 / found["blow_period"]
-    found |= {name: _ratio(blows, *columns) for name, columns in RATIOS.items()}
+    for name, (column, by) in RATIOS.items():
+        found[name] = sums[column] / sums[by] if sums[by] > 0.0 else math.nan
     return found | {name: _greatest(blows[name]) for name in _GREATEST}
 
 
@@ -194,8 +209,3 @@ def _scatter_of_greatest(values: np.ndarray) -> float:
         return math.nan
     near = max(LEAST_BLOWS, math.ceil(_NEAR_GREATEST * len(known)))
     return float(known[-1] - known[-near])
-
-
-def _ratio(blows: np.ndarray, name: str, by: str) -> float:
-    below = float(np.sum(_column(blows, by)))
-    return float(np.sum(_column(blows, name))) / below if below > 0 else math.nan

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS, Status
-from percussion_model.physics.settling import Verdict
+from percussion_model.physics.settling import REQUEST, Verdict
 from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
 from percussion_model.scene.scene import Scene
@@ -25,6 +25,7 @@ _compiled: set[str] = set()
 
 # Steps of a cell after which a run that is to settle is looked at.
 CELL_STEPS = 5e7
+_OPEN = int(Verdict.OPEN)
 _DONE, _FULL = int(Status.DONE), (int(Status.BLOWS_FULL), int(Status.EVENTS_FULL))
 
 
@@ -151,13 +152,13 @@ class Runner:
         SimulationError
             If the run cannot continue, or comes to the deadline.
         """
-        began, one = time.perf_counter(), asked[0]
+        began, one = time.perf_counter(), asked.view(REQUEST)[0]
         if self._settling is None:
-            self._settling = np.zeros(int(one.most), BLOW)
+            self._settling = np.zeros(one["most"], BLOW)
         # in pieces that depend on the scene alone, so that it can be given up
         piece = self.solver.time_of_steps(CELL_STEPS)
-        while one.verdict == Verdict.OPEN:
-            before, one.until = int(one.blows), one.time + piece
+        while one["verdict"] == _OPEN:
+            before, one["until"] = int(one["blows"]), one["time"] + piece
             if time.thread_time() > deadline:
                 raise SimulationError(
                     f"at t = {self.time:.6g} s, after {before} blows: the run has taken all the "
@@ -165,10 +166,10 @@ class Runner:
                     "explain` shows what a blow costs; take fewer cells"
                 )
             status = self.solver.settle(self._state, asked, self._settling)
-            self._time = float(one.time)
-            self._take(status, int(one.blows) - before, 0, self._settling[before:])
+            self._time, found = float(one["time"]), int(one["blows"])
+            self._take(status, found - before, 0, self._settling[before:])
             if progress is not None:
-                progress(int(one.blows))
+                progress(found)
         self.wall_time += time.perf_counter() - began
 
     def _check_time(self, t: float) -> None:
