@@ -52,7 +52,7 @@ LIBRARY_FILES = (
     "variables.py",
 )
 # What every slave needs; START runs outside the package that the sources become.
-SLAVE_FILES = ("__init__.py", "variables.py", "slave/*.py")
+SLAVE_FILES = ("__init__.py", "flat_names.py", "variables.py", "slave/*.py")
 START = "slave/start.py"
 # Files of a model's folder that make its FMU and do not run in it.
 BUILD_FILES = ("build.py", "variables.py")

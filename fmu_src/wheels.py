@@ -1,4 +1,4 @@
-"""Wheels for platforms, with the solvers and the library of FMUs inside.
+"""Wheels for platforms, with the solvers and the libraries of FMUs inside.
 
 `python -m fmu_src.wheels [PLATFORM ...] [-o FOLDER]` makes them, of all platforms if none is named.
 LLVM makes the code and zig links it: no other machine is needed.
@@ -17,11 +17,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fmu_src.archive import ROOT
-from fmu_src.native.library import MODULES, link_fmus, platform_names
+from fmu_src.native.library import MODULES, OF, link_fmus, platform_names
 from fmu_src.native.library import brought_file as fmu_file
 from percussion_model.engine import library
 from percussion_model.engine.compiler import NoCompilerError, objects
-from percussion_model.engine.entries import SOLVERS
+from percussion_model.engine.entries import OTHERS, SOLVERS
 from percussion_model.engine.platforms import PLATFORMS
 from percussion_model.interface.explore.build import BROUGHT, page_file
 from percussion_model.interface.progress import lines
@@ -64,15 +64,16 @@ def fill(folder: Path, name: str, command: Sequence[str], page: Path | None = No
         brought.parent.mkdir(parents=True)
         shutil.copyfile(page, brought)
     (folder / TAG).write_text(TAGS[name], encoding="utf-8")
-    for solver in SOLVERS:
+    for solver in (*SOLVERS, *OTHERS):
         file = folder / library.brought_file(solver, name).relative_to(ROOT)
         file.parent.mkdir(parents=True, exist_ok=True)
         library.link_solver(solver, name, command, file)
-    packed = folder / fmu_file(name).relative_to(ROOT)
-    packed.parent.mkdir(parents=True, exist_ok=True)
-    link_fmus(name, command, packed.with_suffix(""))
-    packed.write_bytes(zlib.compress(packed.with_suffix("").read_bytes(), 9))
-    packed.with_suffix("").unlink()
+    for which in OF:
+        packed = folder / fmu_file(name, which).relative_to(ROOT)
+        packed.parent.mkdir(parents=True, exist_ok=True)
+        link_fmus(name, command, packed.with_suffix(""), which)
+        packed.write_bytes(zlib.compress(packed.with_suffix("").read_bytes(), 9))
+        packed.with_suffix("").unlink()
 
 
 def make_wheel(name: str, command: Sequence[str], out: Path, page: Path | None = None) -> Path:
@@ -108,7 +109,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         names = list(platform_names(given.platforms)) or list(TAGS)
         with lines("compiling") as report:
-            objects(MODULES, names, report)
+            objects([*MODULES, *map(library.module_of, OTHERS)], names, report)
             page = page_file(report)
         for name in names:
             print(f"wrote {make_wheel(name, zig(name), given.out, page)}", flush=True)

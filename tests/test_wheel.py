@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from fmu_src.hammer.build import build_hammer
-from fmu_src.native.library import PLATFORMS, stamp
+from fmu_src.native.library import PARTS, PLATFORMS, libraries, stamp
 from fmu_src.wheels import make_wheel
 from percussion_model import Scene, simulate
 from percussion_model.engine.compiler import compiler_for, kept_folder
@@ -52,11 +52,13 @@ def installed(wheel, built_library, tmp_path_factory):
     kept.mkdir(parents=True)
     for name, content in built_library.items():
         (kept / f"{name}{PLATFORMS[name].suffix}").write_bytes(content)
-    if built_library:
-        make("rigid")
-        solver = Path("engine", "libraries", brought_file("rigid", this_platform()).name)
-        (folder / "percussion_cache" / solver.parent).mkdir(parents=True)
-        shutil.copy2(kept_folder().parent / solver, folder / "percussion_cache" / solver)
+        parts = libraries([name], which=PARTS)[name]
+        (kept / f"{PARTS}{name}{PLATFORMS[name].suffix}").write_bytes(parts)
+    for one in ("rigid", "calls") if built_library else ():
+        make(one)
+        file = Path("engine", "libraries", brought_file(one, this_platform()).name)
+        (folder / "percussion_cache" / file.parent).mkdir(parents=True, exist_ok=True)
+        shutil.copy2(kept_folder().parent / file, folder / "percussion_cache" / file)
     made.variables["PATH"] = str(made.program("percussion").parent)  # without a compiler
     return made
 

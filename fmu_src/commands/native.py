@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fmu_src.commands import options
 from percussion_model.interface.commands import common
 
+if TYPE_CHECKING:
+    from fmu_src.parts.part import PartTable
+
 
 def native(
-    scene: options.Baked = None,
+    scene: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="SCENE",
+            help="A scene file, a preset, or a part of a system, as RigFeed. Default: reference.",
+        ),
+    ] = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for both FMUs.")
     ] = options.DIST,
-    platforms: Annotated[
-        str | None,
-        typer.Option(
-            "--platforms",
-            metavar="NAMES",
-            help="Processors and systems, as linux64,win64,aarch64-linux. Default: this one.",
-        ),
-    ] = None,
+    platforms: options.Platforms = None,
     flat_names: options.FlatNames = False,
     force: options.Force = False,
     rock: common.RockName = None,
     bit: common.BitName = None,
     scene_option: options.BakedToo = None,
 ) -> None:
-    """Bake a scene into FMUs that need no Python, of FMI 2.0 and 3.0.
+    """Bake a scene, or a part, into FMUs that need no Python, of FMI 2.0 and 3.0.
 
     Other platforms than this one need the package ziglang (the extra native).
     """
@@ -39,6 +42,7 @@ def native(
         from fmu_src.hammer.build import refuse_other
         from fmu_src.native.build import build_native, native_files
         from fmu_src.native.library import COMPILING, libraries, platform_names
+        from fmu_src.parts.build import PARTS
         from fmu_src.slave.native import this_platform
         from percussion_model.interface.progress import progress
 
@@ -46,8 +50,14 @@ def native(
             raise common.refusal(
                 f"-o {output}: must be a folder, which two FMUs go to, of FMI 2.0 and of FMI 3.0"
             )
-        file, chosen = options.baked_scene(scene, scene_option, rock, bit)
         names = platform_names((platforms or this_platform()).split(","))
+        part = PARTS.get(str(scene))
+        if part is not None and part.law is not None:
+            if rock or bit:
+                raise common.refusal(f"{part.name}: is no hammer: omit --rock and --bit")
+            _write_part(part, output, names, flat_names)
+            return
+        file, chosen = options.baked_scene(scene, scene_option, rock, bit)
         files = native_files(file, output)
         for path in files.values():
             refuse_other(path, chosen, force)
@@ -60,3 +70,21 @@ def native(
             with progress(f"building the FMU of FMI {version}"):
                 guid = build_native(chosen, path, version, made, flat_names)
             typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
+
+
+def _write_part(part: PartTable, output: Path, names: Mapping[str, str], flat: bool) -> None:
+    """Write both FMUs of a part of a system."""
+    from fmu_src.archive import content, state_of
+    from fmu_src.native.build import SUFFIXES
+    from fmu_src.native.library import COMPILING, PARTS, libraries
+    from fmu_src.parts.build import build_part
+    from percussion_model.interface.progress import progress
+
+    common.check_outputs(output, None)
+    with progress(COMPILING):
+        libraries(names, which=PARTS)
+    for version, suffix in SUFFIXES.items():
+        path = output / f"{part.name}{suffix if version == '3.0' else ''}.fmu"
+        before = content(path)
+        guid = build_part(part, path, flat, version, names)
+        typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}")

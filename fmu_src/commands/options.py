@@ -30,6 +30,14 @@ FlatNames = Annotated[
         help="Underscores for dots in names of variables, of which Simulink makes buses.",
     ),
 ]
+Platforms = Annotated[
+    str | None,
+    typer.Option(
+        "--platforms",
+        metavar="NAMES",
+        help="Processors and systems, as linux64,win64,aarch64-linux. Default: this one.",
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace the FMU of another scene.")]
 
 

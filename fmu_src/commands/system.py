@@ -27,15 +27,21 @@ def system(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for all files.")
     ] = options.DIST,
+    platforms: options.Platforms = None,
     flat_names: options.FlatNames = False,
     force: Annotated[bool, typer.Option("--force", help="Replace FMUs of other hammers.")] = False,
 ) -> int:
-    """Build drilling systems of FMUs as SSP archives, and validate each FMU, or list them."""
+    """Build drilling systems of FMUs as SSP archives, and validate each FMU, or list them.
+
+    The FMUs need no Python, but for a filter of the rock and what was added from outside. Other
+    platforms than this one need the package ziglang (the extra native).
+    """
     with common.needing("fmu"), options.refusing_faults():
         from fmpy.validation import validate_fmu
 
         from fmu_src.archive import content, state_of
-        from fmu_src.native.library import COMPILING, library_here
+        from fmu_src.native.library import COMPILING, OF, libraries, platform_names
+        from fmu_src.slave.native import this_platform
         from fmu_src.system.archive import (
             build_fmus,
             find_plan,
@@ -48,19 +54,20 @@ def system(
         if not systems:
             options.list_choices({plan.name: plan.description for plan in plans()})
             return 0
-        problems = 0
+        problems, names = 0, platform_names((platforms or this_platform()).split(","))
         checked = set()
         chosen = plans() if systems == [ALL] else [find_plan(path) for path in systems]
         common.check_outputs(output, None)
         with progress(COMPILING):
-            library_here()
+            for which in OF:
+                libraries(names, which=which)
         for number, plan in enumerate(chosen):
             before = {path: content(path) for path in output.glob("*.*")}
             text, share = f"building {plan.name}", number / len(chosen)
             with progress(text, share) as report:
                 if len(chosen) > 1:
                     report(f"{text} ({number + 1} of {len(chosen)})", share)
-                fmus = build_fmus(plan, output, force, flat_names)
+                fmus = build_fmus(plan, output, force, flat_names, names)
             for fmu in fmus.values():
                 if fmu in checked:
                     continue

@@ -66,9 +66,10 @@ def _to_xml(about: About, variables: Sequence[Variable], arranged: Sequence[Vari
     SubElement(root, "CoSimulation", {"modelIdentifier": about.model} | CAPABILITIES)
     used = {variable.unit for variable in variables if variable.unit}
     root.append(write_units(used | {TIME_UNIT}))
-    kinds = SubElement(root, "TypeDefinitions")
-    for one in enumerations(variables):
-        write_items(SubElement(kinds, "EnumerationType", {"name": str(one.enumeration)}), one)
+    if found := enumerations(variables):
+        kinds = SubElement(root, "TypeDefinitions")
+        for one in found:
+            write_items(SubElement(kinds, "EnumerationType", {"name": str(one.enumeration)}), one)
     add_log_categories(root, NATIVE)
     SubElement(root, "DefaultExperiment", experiment(about))
     by_name = {variable.name: variable for variable in variables}

@@ -20,8 +20,9 @@ from fmu_src.native.motion import (
     set_inputs,
     step,
 )
-from fmu_src.native.notes import add_note, look, set_fault
+from fmu_src.native.notes import look
 from fmu_src.native.outputs import OUTPUT_COUNT, fill_outputs
+from fmu_src.native.rows import add_note, set_fault
 from percussion_model.engine.faults import Fault
 from percussion_model.engine.image import (
     fill_values,

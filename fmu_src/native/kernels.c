@@ -25,12 +25,16 @@ DECLARE(_base)
 
 #if defined(HAVE_AVX2_KERNELS) && (defined(__x86_64__) || defined(_M_X64))
 DECLARE(_avx2)
+#if defined(HAVE_AVX512_KERNELS) /* not of parts of a system */
 DECLARE(_avx512)
+#endif
 
 Kernels kernels_of_machine(void) {
     switch (widest_vectors()) {
+#if defined(HAVE_AVX512_KERNELS)
     case AVX512:
         return KERNELS(_avx512);
+#endif
     case AVX2:
         return KERNELS(_avx2);
     default:

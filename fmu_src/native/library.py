@@ -1,4 +1,4 @@
-"""The library of the native FMU for each platform: compiled once for all scenes, and kept.
+"""Libraries of native FMUs for each platform: compiled once for all scenes, and kept.
 
 It is kept in `dist/native` of a clone, else in the folder `native` of the user's cache
 (`PERCUSSION_CACHE`).
@@ -35,8 +35,14 @@ from percussion_model.scene.scene import SceneError
 
 HERE = Path(__file__).resolve().parent
 # What the library follows from, besides the solvers.
-SOURCES = ("fmu_src/native", "fmu_src/hammer")
-MODULES = ("fmu_src.native.entries", *map(module_of, SOLVERS))
+SOURCES = ("fmu_src/native", "fmu_src/hammer", "fmu_src/parts")
+# Modules with the entries of a library, by what the name of its file begins with.
+HAMMER, PARTS = "", "parts-"
+OF = {
+    HAMMER: ("fmu_src.native.entries", *map(module_of, SOLVERS)),
+    PARTS: ("fmu_src.native.part_entries",),
+}
+MODULES = tuple(module for modules in OF.values() for module in modules)
 # What a command says meanwhile.
 COMPILING = "compiling the library of FMUs, once for these sources: some minutes"
 # Names of platforms that FMI 2.0 has.
@@ -75,9 +81,9 @@ def kept_folder() -> Path:
     return cache_folder() / "native"
 
 
-def brought_file(name: str) -> Path:
+def brought_file(name: str, which: str = HAMMER) -> Path:
     """Where an installation has the library for a platform, packed, if it brings one."""
-    return HERE / "libraries" / f"{name}-{stamp()}{PLATFORMS[name].suffix}.z"
+    return HERE / "libraries" / f"{which}{name}-{stamp()}{PLATFORMS[name].suffix}.z"
 
 
 def _content(file: Path) -> bytes:
@@ -86,16 +92,17 @@ def _content(file: Path) -> bytes:
     return zlib.decompress(content) if file.suffix == ".z" else content
 
 
-def _file_in(folder: Path, name: str) -> Path:
+def _file_in(folder: Path, name: str, which: str) -> Path:
     """File of the library for a platform: what is brought, or else in a folder."""
-    brought = brought_file(name)
-    return brought if brought.is_file() else folder / f"{name}{PLATFORMS[name].suffix}"
+    brought = brought_file(name, which)
+    return brought if brought.is_file() else folder / f"{which}{name}{PLATFORMS[name].suffix}"
 
 
 def libraries(
     names: Sequence[str] | Mapping[str, str],
     kept: Path | None = None,
     report: Report | None = None,
+    which: str = HAMMER,
 ) -> dict[str, bytes]:
     """Libraries by platform: those that are kept, the others compiled now.
 
@@ -109,10 +116,12 @@ def libraries(
         Folder; `kept_folder` if left out.
     report : callable, optional
         Takes what is being done, and the share that is done.
+    which : str
+        Of `OF`.
     """
     words = names if isinstance(names, Mapping) else {name: name for name in names}
     folder = (kept or kept_folder()) / stamp()
-    files = {name: _file_in(folder, name) for name in words if name in PLATFORMS}
+    files = {name: _file_in(folder, name, which) for name in words if name in PLATFORMS}
     compilers = {
         name: compiler_for(name, words[name])
         for name in words
@@ -122,32 +131,37 @@ def libraries(
         folder.mkdir(parents=True, exist_ok=True)
         with only_one(folder.with_suffix(".lock")):
             left = {name: file for name, file in files.items() if not file.is_file()}
-            _compile(left, compilers, report)
+            _compile(left, compilers, report, which)
             remove_old(folder.parent, "*/")
     return {name: _content(files[name]) for name in words}
 
 
 def _compile(
-    files: Mapping[str, Path], compilers: Mapping[str, Sequence[str]], report: Report | None
+    files: Mapping[str, Path],
+    compilers: Mapping[str, Sequence[str]],
+    report: Report | None,
+    which: str,
 ) -> None:
     """Compile libraries by platform."""
     if files:
-        objects(MODULES, list(files), report)
+        objects(OF[which], list(files), report)
     for name, file in files.items():
-        link_fmus(name, compilers[name], file)
+        link_fmus(name, compilers[name], file, which)
 
 
-def link_fmus(name: str, command: Sequence[str], file: Path) -> None:
-    """Link the library of FMUs for a platform.
+def link_fmus(name: str, command: Sequence[str], file: Path, which: str = HAMMER) -> None:
+    """Link a library of FMUs for a platform.
 
     Parameters
     ----------
     command : sequence of str
         Of a C compiler.
+    which : str
+        Of `OF`.
     """
     import fmpy
 
-    parts = objects(MODULES, [name])[name]
+    parts = objects(OF[which], [name])[name]
     headers = f"-isystem{Path(fmpy.__file__).parent / 'c-code'}"
     sources = [*sorted(HERE.glob("*.c")), ENGINE / "memory.c"]
     link(name, command, sources, parts, file, [f"-I{HERE}", headers])

@@ -6,8 +6,8 @@ from fmu_src.hammer.warnings import INTERVAL
 from fmu_src.native.messages import Note
 from fmu_src.native.motion import count_of, read
 from fmu_src.native.outputs import numerical, residual
+from fmu_src.native.rows import add_note
 from percussion_model.engine.layout import head_records, last_blow, motion_of
-from percussion_model.engine.memory import floats_at, words_at
 from percussion_model.physics.kernel import preparing
 from percussion_model.physics.power_law import secant_stiffness
 from percussion_model.physics.records import Mode, RockKind
@@ -20,32 +20,6 @@ from percussion_model.simulation.validity import (
     MOST_RATE,
     MOST_RESIDUAL,
 )
-
-# Rows of notes, as the shell has them (fmu_src/native/shell.h); the first is for a fault.
-ROW, ROWS = 8, 32
-TIME = 6  # place of the fact that tells when
-
-
-@preparing
-def add_note(notes, number, first, second, time):
-    """Write a row: the number of a template and its facts."""
-    count = words_at(notes, 1)
-    k = max(count[0], 1)
-    if k < ROWS:
-        words_at(notes + 8 * (1 + ROW * k), 1)[0] = number
-        facts = floats_at(notes + 8 * (2 + ROW * k), ROW - 1)
-        facts[0], facts[1], facts[TIME] = first, second, time
-        count[0] = k + 1
-
-
-@preparing
-def set_fault(notes, number, facts):
-    """Write why a kernel refuses, with its facts; its number."""
-    words_at(notes, 2)[1] = number
-    written = floats_at(notes + 16, ROW - 1)
-    for k in range(len(facts)):
-        written[k] = facts[k]
-    return number
 
 
 @preparing

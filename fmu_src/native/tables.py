@@ -1,4 +1,4 @@
-"""The tables of a scene for the native FMU: all that its library does not know by itself.
+"""The tables of a native FMU: all that its library does not know by itself.
 
 The file `model.bin` is read by `tables.c`, whose records these are: little endian, each section
 at a multiple of 8 bytes, texts as places in one section, a hash of all in the head.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from fmu_src.description import depends_at_start
@@ -140,26 +140,42 @@ def model_tables(
     """
     if faults is None or notes is None:
         faults, notes = faults_of(gauge_bars(scene)), messages.notes()
-    return _Writer(scene).write(guid, faults, notes)
+    writer = TableWriter(hammer_variables(scene), scene_image(scene))
+    return writer.write(guid, faults, notes, _drives(writer, scene))
 
 
-class _Writer:
-    """Collects the sections of the tables."""
+class TableWriter:
+    """Collects the sections of the tables.
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    Parameters
+    ----------
+    variables : sequence of Variable
+        Of FMI 2.0.
+    image : Image
+        With a word for each of them but outputs.
+    """
+
+    def __init__(self, variables: Sequence[Variable], image: Image) -> None:
         order = ("input", "output", "parameter")
         self.variables = sorted(
-            hammer_variables(scene), key=lambda one: order.index(one.causality)
+            variables, key=lambda one: order.index(one.causality)
         )  # as they are: `tables.c` relies on it
+        self.arranged = fmi3_variables(variables)
         self.index = {one.name: k for k, one in enumerate(self.variables)}
-        self.image = scene_image(scene)
+        self.image = image
         self.text = bytearray(b"\0")
         self.places: dict[str, int] = {"": 0}
         self.choices: list[int] = []
 
-    def write(self, guid: str, faults: Sequence[str], notes: Sequence[str]) -> bytes:
+    def write(
+        self,
+        guid: str,
+        faults: Sequence[str],
+        notes: Sequence[str] = ("",),
+        drives: Iterable[bytes] = (),
+    ) -> bytes:
         """All sections behind their head."""
+        packed = list(drives)
         counts = [
             sum(one.causality == kind for one in self.variables) for kind in ("input", "output")
         ]
@@ -167,13 +183,13 @@ class _Writer:
         records = [self._variable(one, outputs) for one in self.variables]
         entries, members, known = self._entries()
         sections = {
-            "head": _whole([self._place(guid), *counts, self.image.plain_words]),
+            "head": _whole([self.place(guid), *counts, self.image.plain_words]),
             "variables": (b"".join(records), len(records)),
             "choices": (struct.pack(f"<{len(self.choices)}q", *self.choices), len(self.choices)),
             "image": (self.image.packed(), len(self.image.words)),
-            "drive": (b"".join(self._drives()), 1 + len(PRESSURES)),
-            "notes": _whole([self._place(one) for one in notes]),
-            "faults": _whole([self._place(one) for one in faults]),
+            "drive": (b"".join(packed), len(packed)),
+            "notes": _whole([self.place(one) for one in notes]),
+            "faults": _whole([self.place(one) for one in faults]),
             "entries": (b"".join(entries), len(entries)),
             "members": _whole(members),
             "known": _whole(known),
@@ -181,7 +197,7 @@ class _Writer:
         sections["text"] = bytes(self.text), len(self.text)  # when all have their places
         return _file(sections)
 
-    def _place(self, text: str) -> int:
+    def place(self, text: str) -> int:
         """Where a text stands."""
         if "\0" in text:
             raise ValueError(f"a zero in a text of the tables: {text!r}")
@@ -198,13 +214,13 @@ class _Writer:
         first, self.choices = len(self.choices), [*self.choices, *choices]
         conversion, place = (NOWHERE, next(outputs)) if is_output else self._word(one)
         return VARIABLE.pack(
-            one.reference, self._place(one.name), TYPES[one.type], CAUSALITIES[one.causality],
+            one.reference, self.place(one.name), TYPES[one.type], CAUSALITIES[one.causality],
             conversion, place,
             0.0 if is_output else float(one.start), lower, upper,
             math.nan if one.left_out is None else float(one.left_out),
             one.left_out is not None, NEEDS.get(one.name, 0),
-            self._place("" if row is None else row.allowed + remark(row.key)),
-            self._place("" if row is None else unit_suffix(row.unit)),
+            self.place("" if row is None else row.allowed + remark(row.key)),
+            self.place("" if row is None else unit_suffix(row.unit)),
             first, len(choices),
         )  # fmt: skip
 
@@ -230,18 +246,6 @@ class _Writer:
             raise ValueError(f"{one.name} starts with {started!r}, but the scene has {held!r}")
         return conversion, place
 
-    def _drives(self) -> Iterator[bytes]:
-        """Bounds of the drive force, which is a product, and of pressures of drives by choice."""
-        choices = self.scene.row_of("effects.drive").choices
-        names = [(PRODUCT, "drive_force", 0)]
-        names += [("supply_pressure", name, 1 + choices.index(drive))
-                  for drive, name in PRESSURES.items()]  # fmt: skip
-        at = [self.index[name] for name in (*DRIVE_INPUTS[:3], "effects.drive")]
-        for shown, name, choice in names:
-            row = self.scene.row_of(INPUTS[name].key)
-            texts = map(self._place, (shown, row.allowed, unit_suffix(row.unit)))
-            yield DRIVE.pack(*at, choice, *texts, *closed_bounds(row))
-
     def _known_at_start(self, one: Variable3, found: Sequence[Variable3]) -> list[int]:
         """Indices of the variables of FMI 3.0 on which one depends at the start."""
         if one.causality != "output":
@@ -259,7 +263,7 @@ class _Writer:
 
     def _entries(self) -> tuple[list[bytes], list[int], list[int]]:
         """Variables of FMI 3.0, indices of their members, and what outputs depend on."""
-        found = fmi3_variables(self.scene)
+        found = self.arranged
         records: list[bytes] = []
         members: list[int] = []
         known: list[int] = []
@@ -268,13 +272,26 @@ class _Writer:
             needed = self._known_at_start(one, found)
             records.append(
                 ENTRY.pack(
-                    one.reference, self._place(one.name), TYPES3[one.type],
+                    one.reference, self.place(one.name), TYPES3[one.type],
                     CAUSALITIES[one.causality], len(members), len(mine), len(known), len(needed),
                 )
             )  # fmt: skip
             members += mine
             known += needed
         return records, members, known
+
+
+def _drives(writer: TableWriter, scene: Scene) -> Iterator[bytes]:
+    """Bounds of the drive force, which is a product, and of pressures of drives by choice."""
+    choices = scene.row_of("effects.drive").choices
+    names = [(PRODUCT, "drive_force", 0)]
+    names += [("supply_pressure", name, 1 + choices.index(drive))
+              for drive, name in PRESSURES.items()]  # fmt: skip
+    at = [writer.index[name] for name in (*DRIVE_INPUTS[:3], "effects.drive")]
+    for shown, name, choice in names:
+        row = scene.row_of(INPUTS[name].key)
+        texts = map(writer.place, (shown, row.allowed, unit_suffix(row.unit)))
+        yield DRIVE.pack(*at, choice, *texts, *closed_bounds(row))
 
 
 def _key(one: Variable) -> str:

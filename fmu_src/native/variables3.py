@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from fmu_src.hammer.variables import hammer_variables
 from fmu_src.variables import Variable
-from percussion_model.scene.scene import Scene
 
 Type3 = Literal["Float64", "Int32", "Boolean", "Enumeration"]
 TYPES: dict[str, Type3] = {
@@ -51,20 +50,20 @@ class Variable3:
     dimensions: tuple[int, ...] = ()
 
 
-def fmi3_variables(scene: Scene) -> list[Variable3]:
-    """Return the variables of an FMI 3.0 FMU that bakes in a scene, `time` first."""
+def fmi3_variables(variables: Sequence[Variable]) -> list[Variable3]:
+    """Return variables of FMI 2.0 as an FMU of FMI 3.0 has them, `time` first."""
     time = Variable3(TIME, TIME_REFERENCE, "Float64", "independent", "continuous")
-    found = [time, *(_variable(group) for group in _groups(scene).values())]
+    found = [time, *(_variable(group) for group in _groups(variables).values())]
     references = {one.reference for one in found}
     if len(references) != len(found):
         raise ValueError("two variables of FMI 3.0 have the same value reference")
     return found
 
 
-def _groups(scene: Scene) -> dict[str, list[Variable]]:
+def _groups(variables: Sequence[Variable]) -> dict[str, list[Variable]]:
     """Variables of FMI 2.0 by the name under which FMI 3.0 has them."""
     groups: dict[str, list[Variable]] = {}
-    for one in hammer_variables(scene):
+    for one in variables:
         groups.setdefault(array_name(one.name) or one.name, []).append(one)
     return groups
 

@@ -13,113 +13,99 @@ Masses are the state, so none is lost; pressures in these equations are absolute
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+
+from fmu_src.parts.part import NUMBER
+from percussion_model.physics.elementary import expm1, log
+from percussion_model.physics.kernel import kernel
 
 GAS_CONSTANT = 287.05  # of air [J/(kg K)]
 WATER, GRAVITY = 1000.0, 9.81  # [kg/m^3], [m/s^2]
 LONGEST_STEP = 1e-3  # of the integration, short against filling the hose [s]
+# A pressure that has come to that of the relief valve by rounding opens it.
+ROUNDING = 1e-12
+# Mass of air in receiver and hose, what the drive has told to have used; air from the compressor,
+# by vent and relief valve, and by the latter alone [kg]; displacement of the bit [m].
+STATE = dict.fromkeys(("receiver", "hose", "used", "given", "lost", "relieved", "depth"), NUMBER)
 
 
-class AirLine:
-    """Masses of air in receiver and hose, and what went through.
+@kernel
+def heat_of(p):
+    """R T of the air [J/kg]."""
+    return GAS_CONSTANT * p.air_temperature
 
-    Attributes
-    ----------
-    receiver, hose : float
-        Mass of air in them [kg].
-    used : float
-        What the drive has told to have used [kg].
-    given, lost, relieved : float
-        Air from the compressor, by vent and relief valve, and by the latter alone [kg].
-    flow : float
-        Of the compressor [kg/s].
-    """
 
-    STATE: ClassVar[tuple[str, ...]] = (
-        "receiver", "hose", "used", "given", "lost", "relieved", "flow", "energy", "depth",
-    )  # fmt: skip
+@kernel
+def begin(p, u, s):
+    """Start with receiver and hose full."""
+    start = p.start_pressure + p.ambient_pressure
+    s.receiver = p.receiver_volume / heat_of(p) * start
+    s.hose = p.hose_volume / heat_of(p) * start
+    s.used, s.depth = u.air_used, u.bit_position
 
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        self.parameters = p = parameters
-        self.heat = GAS_CONSTANT * p["air.temperature"]  # R T [J/kg]
-        # mass by pressure [kg/Pa]
-        self.in_receiver = p["receiver.volume"] / self.heat
-        self.in_hose = p["hose.volume"] / self.heat
-        area = 0.25 * math.pi * p["hose.diameter"] ** 2
-        resistance = p["hose.friction"] * p["hose.length"] * self.heat
-        self.conductance = area * math.sqrt(p["hose.diameter"] / resistance)
-        self.ambient = p["ambient.pressure"]
-        self.receiver = self.hose = self.used = self.given = self.lost = self.relieved = 0.0
-        self.flow = self.energy = self.depth = 0.0
 
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Start with receiver and hose full."""
-        start = self.parameters["start.pressure"] + self.ambient
-        self.receiver, self.hose = self.in_receiver * start, self.in_hose * start
-        self.used, self.depth = inputs["air_used"], inputs["bit_position"]
+@kernel
+def step(p, u, s, h):
+    """Advance the masses by a communication step [s]."""
+    wanted = min(u.pressure_command, p.source_pressure_limit)
+    wanted = wanted * (1.0 - u.pressure_loss) + p.ambient_pressure
+    drawn = (u.air_used - s.used) / h
+    s.used, s.depth = u.air_used, u.bit_position
+    in_receiver = p.receiver_volume / heat_of(p)  # mass by pressure [kg/Pa]
+    count = max(1, math.ceil(h / LONGEST_STEP))
+    for _ in range(count):
+        advance(p, s, in_receiver * wanted, drawn, h / count)
 
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Advance the masses by a communication step [s]."""
-        p = self.parameters
-        wanted = min(inputs["pressure_command"], p["source.pressure_limit"])
-        wanted = wanted * (1.0 - inputs["pressure_loss"]) + self.ambient
-        drawn = (inputs["air_used"] - self.used) / step_size
-        self.used, self.depth = inputs["air_used"], inputs["bit_position"]
-        count = max(1, math.ceil(step_size / LONGEST_STEP))
-        for _ in range(count):
-            self._advance(self.in_receiver * wanted, drawn, step_size / count)
 
-    def _advance(self, wanted: float, drawn: float, h: float) -> None:
-        """The same by a step in which the flow of the hose is held [s]."""
-        p, time = self.parameters, self.parameters["source.time"]
-        through = self._through_hose(h)
-        # mean flow of a source that follows, with what the hose takes
-        aim = wanted - through * time
-        flow = through - math.expm1(-h / time) * (aim - self.receiver) / h
-        vent = p["vent.flow_limit"] * self.receiver / p["receiver.volume"]
-        flow = min(max(flow, -vent), p["compressor.flow_limit"])
-        self.receiver += h * (flow - through)
-        self.hose += h * (through - drawn)
-        self.flow = max(flow, 0.0)
-        self.given += h * self.flow
-        self.lost += h * (self.flow - flow)
-        excess = self.receiver - self.in_receiver * (p["relief_pressure"] + self.ambient)
-        if excess > 0.0:
-            self.receiver -= excess
-            self.lost += excess
-            self.relieved += excess
-        work = self.heat * math.log(max(self.receiver / self.in_receiver / self.ambient, 1.0))
-        self.energy += h * self.flow * work / p["compressor.efficiency"]
+@kernel
+def advance(p, s, wanted, drawn, h):
+    """The same by a step in which the flow of the hose is held [s]."""
+    heat, time, through = heat_of(p), p.source_time, through_hose(p, s, h)
+    in_receiver, ambient = p.receiver_volume / heat, p.ambient_pressure
+    # mean flow of a source that follows, with what the hose takes
+    aim = wanted - through * time
+    flow = through - expm1(-h / time) * (aim - s.receiver) / h
+    vent = p.vent_flow_limit * s.receiver / p.receiver_volume
+    flow = min(max(flow, -vent), p.compressor_flow_limit)
+    s.receiver += h * (flow - through)
+    s.hose += h * (through - drawn)
+    s.flow = max(flow, 0.0)
+    s.given += h * s.flow
+    s.lost += h * (s.flow - flow)
+    excess = s.receiver - in_receiver * (p.relief_pressure + ambient)
+    if excess > 0.0:
+        s.receiver -= excess
+        s.lost += excess
+        s.relieved += excess
+    work = heat * log(max(s.receiver / in_receiver / ambient, 1.0))
+    s.energy += h * s.flow * work / p.compressor_efficiency
 
-    def _through_hose(self, h: float) -> float:
-        """Flow from receiver to hammer, no more than makes pressures equal [kg/s]."""
-        before, behind = self.receiver / self.in_receiver, self.hose / self.in_hose
-        drop = before * before - max(behind, 0.0) ** 2
-        flow = math.copysign(self.conductance * math.sqrt(abs(drop)), drop)
-        equal = (before - behind) / (1.0 / self.in_receiver + 1.0 / self.in_hose) / h
-        return min(flow, equal) if equal > 0.0 else max(flow, equal)
 
-    def signals(self) -> dict[str, Any]:
-        """What hammer, rock and controller take."""
-        height = self.parameters["hole.depth"] + self.depth - self.parameters["water.depth"]
-        is_wet = self.parameters["water.depth"] >= 0.0
-        return {
-            "supply_pressure": max(self.hose / self.in_hose - self.ambient, 0.0),
-            "back_pressure": WATER * GRAVITY * max(height, 0.0) if is_wet else 0.0,
-        }
+@kernel
+def through_hose(p, s, h):
+    """Flow from receiver to hammer, no more than makes pressures equal [kg/s]."""
+    heat = heat_of(p)
+    in_receiver, in_hose = p.receiver_volume / heat, p.hose_volume / heat
+    area = 0.25 * math.pi * (p.hose_diameter * p.hose_diameter)
+    conductance = area * math.sqrt(p.hose_diameter / (p.hose_friction * p.hose_length * heat))
+    before, behind = s.receiver / in_receiver, s.hose / in_hose
+    drop = before * before - max(behind, 0.0) * max(behind, 0.0)
+    flow = math.copysign(conductance * math.sqrt(abs(drop)), drop)
+    equal = (before - behind) / (1.0 / in_receiver + 1.0 / in_hose) / h
+    return min(flow, equal) if equal > 0.0 else max(flow, equal)
 
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        pressure = self.receiver / self.in_receiver - self.ambient
-        taken_in = self.heat / self.ambient  # volume by mass, in the surroundings
-        return {
-            **self.signals(),
-            "hose_pressure": pressure,
-            "flow": self.flow * taken_in,
-            "energy": self.energy,
-            "relief_volume": self.relieved * taken_in,
-            "relief_open": pressure >= self.parameters["relief_pressure"] * (1.0 - 1e-12),
-            "air_given": self.given,
-            "air_lost": self.lost,
-            "air_stored": self.receiver + self.hose,
-        }
+
+@kernel
+def outputs(p, s, y):
+    """Present values."""
+    heat = heat_of(p)
+    pressure = s.receiver / (p.receiver_volume / heat) - p.ambient_pressure
+    y.supply_pressure = max(s.hose / (p.hose_volume / heat) - p.ambient_pressure, 0.0)
+    y.back_pressure = 0.0
+    if p.water_depth >= 0.0:
+        height = p.hole_depth + s.depth - p.water_depth
+        y.back_pressure = WATER * GRAVITY * max(height, 0.0)
+    taken_in = heat / p.ambient_pressure  # volume by mass, in the surroundings
+    y.hose_pressure, y.flow, y.energy = pressure, s.flow * taken_in, s.energy
+    y.relief_volume = s.relieved * taken_in
+    y.relief_open = pressure >= p.relief_pressure * (1.0 - ROUNDING)
+    y.air_given, y.air_lost, y.air_stored = s.given, s.lost, s.receiver + s.hose

@@ -1,13 +1,19 @@
-"""FMUs of parts, from their tables."""
+"""FMUs of parts, from their tables: native ones, and of two that run by Python."""
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from fmu_src.archive import write_fmu
 from fmu_src.description import About
+from fmu_src.native.archive import Version, needs_nothing, write_native
+from fmu_src.native.library import PARTS as LIBRARY
+from fmu_src.native.library import libraries
+from fmu_src.native.part_tables import part_tables
 from fmu_src.page import write_page
 from fmu_src.parts import (
     controller,
@@ -20,6 +26,7 @@ from fmu_src.parts import (
 )
 from fmu_src.parts import own_controller as own
 from fmu_src.parts.part import COUNT, PartTable
+from fmu_src.slave.native import this_platform
 from fmu_src.staging import stage
 from fmu_src.units import fmi_unit
 from fmu_src.variables import FILE, Variable, magnitude, number_row, write_variables
@@ -107,10 +114,38 @@ def _real(part: PartTable, unit: str | None, **rest: Any) -> Variable:
     return Variable(type="Real", unit=shown, **given)
 
 
-def build_part(part: PartTable, path: Path, flat: bool = False) -> str:
-    """Write the FMU of a part, with `flat` names of variables or not; return its GUID."""
+def build_part(
+    part: PartTable,
+    path: Path,
+    flat: bool = False,
+    version: Version = "2.0",
+    platforms: Sequence[str] | Mapping[str, str] = (),
+) -> str:
+    """Write the FMU of a part; return its GUID.
+
+    Parameters
+    ----------
+    flat : bool
+        Whether names of variables have no dots.
+    version : str
+        Of FMI; a part that runs by Python has 2.0 alone.
+    platforms : sequence of str, optional
+        On which a native one is to run; this one if left out.
+
+    Raises
+    ------
+    NoCompilerError
+        If there is no library for a platform, and nothing that would make it.
+    """
     variables = part_variables(part)
-    about = About(path.stem, part.description, STOP_TIME, STEP_SIZE, flat=flat)
+    # the name of the file is no identifier, that of the model is
+    model = path.stem.partition("-")[0]
+    about = About(model, part.description, STOP_TIME, STEP_SIZE, flat=flat)
+    if part.law is not None:
+        found = libraries(platforms or [this_platform()], which=LIBRARY)
+        tables = functools.partial(part_tables, part, variables)
+        page = write_page(about, variables, None, needs_nothing(found))
+        return write_native(path, version, about, variables, page, found, tables)
     bundle = stage("drilling_system", "parts", with_model=False)
     return write_fmu(
         path, about, variables, bundle, part.slave, {FILE: write_variables(variables)},
@@ -136,8 +171,10 @@ def build_controller(file: Path, name: str, path: Path) -> str:
     table = replace(
         controller.TABLE,
         name=path.stem,
+        law=None,
         slave=own.OwnControllerPart,
         description=f"{name} of {file.name}, a controller of feed and pressure",
+        inputs={one: controller.TABLE.inputs[one] for one in own.INPUTS},
         outputs={one: controller.TABLE.outputs[one] for one in own.SIGNALS},
         parameters={one: _argument(one, start) for one, start in starts.items()},
         at_start=dict.fromkeys(own.SIGNALS, tuple(controller.TABLE.inputs)),

@@ -7,180 +7,146 @@ let the pressure follow the feed.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import Any
-
-from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
-from fmu_src.parts.seeker import FEED, PRESSURE, Seeker
+from fmu_src.parts import seeker
+from fmu_src.parts.part import COUNT, NUMBER, Law, PartTable
+from fmu_src.parts.seeker import FEED, PRESSURE
+from percussion_model.physics.elementary import exp
+from percussion_model.physics.kernel import kernel
 
 DRILLING, VOID, RETRACT = 0, 1, 2
 
 
-class DrillController(Model):
-    """All blocks, with their state."""
+@kernel
+def begin(p, u, s, w):
+    """Start with the force that the rig has."""
+    s.wanted, s.command = u.feed_setpoint, p.start_force
+    s.integral = s.command - s.wanted
+    s.pressure = u.pressure_setpoint
+    s.centres[FEED], s.centres[PRESSURE] = s.wanted, s.pressure
+    s.pause_end = p.seek_wait
 
-    time: float
-    mode: int
-    since: float
-    wanted: float
-    integral: float
-    command: float
-    pressure: float
-    jam_time: float
-    speed: float
-    seeker: Seeker
-    STATE = tuple(__annotations__)
 
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        super().__init__(parameters)
-        for name in self.STATE:
-            setattr(self, name, 0.0)
-        self.mode = DRILLING
-        self.seeker = Seeker(parameters)
-        self._share = 0.0, 0.0  # of a step that the filter of the speed lets through
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Start with the force that the rig has."""
-        self.wanted = inputs["feed_setpoint"]
-        self.command = self.parameters["start.force"]
-        self.integral = self.command - self.wanted
-        self.pressure = inputs["pressure_setpoint"]
-        self.seeker.centres = [self.wanted, self.pressure]
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """One sample of the controller."""
-        p, h = self.parameters, step_size
-        self.time += h
-        if h != self._share[0]:
-            self._share = h, 1.0 - math.exp(-h / p["speed_filter"])
-        self.speed += self._share[1] * (inputs["head_velocity"] - self.speed)
-        self._choose_mode(inputs, h)
-        goal, pressure = inputs["feed_setpoint"], inputs["pressure_setpoint"]
-        if p["seek.on"]:
-            if self.mode == DRILLING:
-                sought = self.seeker.sample(inputs, self.time, h)
-                goal, pressure = sought if p["seek.pressure_on"] else (sought[0], pressure)
-            else:
-                self.seeker.pause(self.time)
-                if p["seek.pressure_on"]:
-                    pressure = self.seeker.centres[PRESSURE]
-        if self.mode == DRILLING:
-            self._ramp_feed(goal, h)
-            self._control_feed(inputs["feed_force"], h)
-            self._set_pressure(inputs, pressure, h)
-        elif self.mode == VOID:
-            self.wanted = min(self.wanted, p["cutback.feed"])
-            self._send(self.integral + p["cutback.force"], h)
-            self._set_pressure(inputs, p["cutback.pressure"], h)
+@kernel
+def step(p, u, s, w, h):
+    """One sample of the controller."""
+    s.time += h
+    s.speed += (1.0 - exp(-h / p.speed_filter)) * (u.head_velocity - s.speed)
+    choose_mode(p, u, s, h)
+    goal, pressure = u.feed_setpoint, u.pressure_setpoint
+    if p.seek_on:
+        if s.mode == DRILLING:
+            goal, sought = seeker.sample(p, u, s, h)
+            pressure = sought if p.seek_pressure_on else pressure
         else:
-            self.wanted = min(self.wanted, p["cutback.feed"])
-            self._relax_integral(inputs["feed_force"], h)
-            self._send(self.integral + p["retract.force"], h)
-            self._set_pressure(inputs, pressure, h)
-
-    def _choose_mode(self, inputs: dict[str, Any], h: float) -> None:
-        p = self.parameters
-        self.since += h
-        torque = inputs["rotation_torque"]
-        self.jam_time = self.jam_time + h if torque > p["retract.torque"] else 0.0
-        settled = self.since >= p["mode_time"]
-        mode = self.mode
-        if p["retract.on"] and mode != RETRACT and self.jam_time >= p["retract.delay"]:
-            mode = RETRACT
-        elif mode == RETRACT and settled and torque < p["retract.share"] * p["retract.torque"]:
-            mode = DRILLING
-        elif p["cutback.on"] and mode == DRILLING and self.speed > p["cutback.velocity"]:
-            mode = VOID
-        elif (
-            mode == VOID
-            and settled
-            and self.speed < 0.5 * p["cutback.velocity"]
-            and inputs["feed_force"] > 0.5 * p["cutback.feed"]
-        ):
-            mode = DRILLING
-        if mode != self.mode:
-            self.mode, self.since = mode, 0.0
-
-    def _ramp_feed(self, goal: float, h: float) -> None:
-        """The wanted feed moves at a limited rate."""
-        most = self.parameters["feed_rate"] * h
-        self.wanted += min(max(goal - self.wanted, -most), most)
-
-    def _control_feed(self, feed: float, h: float) -> None:
-        """PI beside the wanted feed itself; the integral stops where the command is limited.
-
-        So the integral is what weights and reaction bring, which a void does not change much.
-        """
-        p = self.parameters
-        error = self.wanted - feed if p["pi.on"] else 0.0
-        raised = self.integral + h * p["pi.gain"] / p["pi.time"] * error
-        command = self.wanted + p["pi.gain"] * error + raised
-        if abs(command) <= p["force_limit"] or error * command < 0.0:
-            self.integral = raised
-        self._send(command, 0.0)
-
-    def _relax_integral(self, feed: float, h: float) -> None:
-        """A retract that does not help in its time takes too much for the weights: less of it."""
-        p = self.parameters
-        if self.since > p["mode_time"] and self.command > -p["force_limit"]:
-            excess = max(0.0, feed - self.wanted)
-            self.integral -= h * p["pi.gain"] / p["pi.time"] * excess
-
-    def _send(self, force: float, h: float) -> None:
-        """Send a force; at a limited rate where `h` [s] is given."""
-        limit = self.parameters["force_limit"]
-        force = min(max(force, -limit), limit)
-        if h > 0.0:
-            most = self.parameters["force_rate"] * h
-            force = self.command + min(max(force - self.command, -most), most)
-        self.command = force
-
-    def _set_pressure(self, inputs: dict[str, Any], goal: float, h: float) -> None:
-        """Pressure follows the feed, at a limited rate."""
-        p = self.parameters
-        if p["ratio.on"]:
-            goal = min(goal, max(p["ratio.lowest"], p["ratio.slope"] * inputs["feed_force"]))
-        most = p["pressure_rate"] * h
-        self.pressure += min(max(goal - self.pressure, -most), most)
-
-    def signals(self) -> dict[str, Any]:
-        """What rig, supply and hammer take."""
-        percussion = self.mode != VOID or self.parameters["cutback.pressure"] > 0.0
-        return {
-            "force_command": self.command,
-            "pressure_command": self.pressure,
-            "percussion_on": percussion,
-        }
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        return self.signals() | {
-            "mode": int(self.mode),
-            "feed_wanted": self.wanted,
-            "seek.centre": self.seeker.centres[FEED],
-            "seek.gradient": self.seeker.gradients[FEED],
-            "seek.pressure_centre": self.seeker.centres[PRESSURE],
-            "seek.pressure_gradient": self.seeker.gradients[PRESSURE],
-        }
-
-    def state_fault(self, saved: Mapping[str, Any]) -> str:
-        """As in `Model`: modes and lengths of lists."""
-        if saved["mode"] not in (DRILLING, VOID, RETRACT):
-            return f"mode = {saved['mode']!r}, which must be 0, 1 or 2"
-        for name, value in saved["seeker"].items():
-            own = getattr(self.seeker, name)
-            if isinstance(own, list) and len(value) != len(own):
-                return f"{len(value)} numbers in {name}, which must be {len(own)}"
-        return ""
+            seeker.pause(p, s)
+            if p.seek_pressure_on:
+                pressure = s.centres[PRESSURE]
+    if s.mode == DRILLING:
+        # the wanted feed moves at a limited rate
+        s.wanted += within(goal - s.wanted, p.feed_rate * h)
+        control_feed(p, s, u.feed_force, h)
+        set_pressure(p, u, s, pressure, h)
+        return 0
+    s.wanted = min(s.wanted, p.cutback_feed)
+    if s.mode == VOID:
+        send(p, s, s.integral + p.cutback_force, h)
+        set_pressure(p, u, s, p.cutback_pressure, h)
+    else:
+        relax_integral(p, s, u.feed_force, h)
+        send(p, s, s.integral + p.retract_force, h)
+        set_pressure(p, u, s, pressure, h)
+    return 0
 
 
-DrillControllerPart = slave_of(DrillController)
+@kernel
+def within(value, most):
+    """The value, of at most a size."""
+    return min(max(value, -most), most)
 
+
+@kernel
+def choose_mode(p, u, s, h):
+    """Take the mode that what is measured asks for."""
+    s.since += h
+    torque, mode = u.rotation_torque, s.mode
+    s.jam_time = s.jam_time + h if torque > p.retract_torque else 0.0
+    settled = s.since >= p.mode_time
+    if p.retract_on and mode != RETRACT and s.jam_time >= p.retract_delay:
+        mode = RETRACT
+    elif mode == RETRACT and settled and torque < p.retract_share * p.retract_torque:
+        mode = DRILLING
+    elif p.cutback_on and mode == DRILLING and s.speed > p.cutback_velocity:
+        mode = VOID
+    elif mode == VOID and settled and s.speed < 0.5 * p.cutback_velocity:
+        mode = DRILLING if u.feed_force > 0.5 * p.cutback_feed else VOID
+    if mode != s.mode:
+        s.mode, s.since = mode, 0.0
+
+
+@kernel
+def control_feed(p, s, feed, h):
+    """PI beside the wanted feed itself; the integral stops where the command is limited.
+
+    So the integral is what weights and reaction bring, which a void does not change much.
+    """
+    error = s.wanted - feed if p.pi_on else 0.0
+    raised = s.integral + h * p.pi_gain / p.pi_time * error
+    command = s.wanted + p.pi_gain * error + raised
+    if abs(command) <= p.force_limit or error * command < 0.0:
+        s.integral = raised
+    send(p, s, command, 0.0)
+
+
+@kernel
+def relax_integral(p, s, feed, h):
+    """A retract that does not help in its time takes too much for the weights: less of it."""
+    if s.since > p.mode_time and s.command > -p.force_limit:
+        s.integral -= h * p.pi_gain / p.pi_time * max(0.0, feed - s.wanted)
+
+
+@kernel
+def send(p, s, force, h):
+    """Send a force; at a limited rate where `h` [s] is given."""
+    force = within(force, p.force_limit)
+    if h > 0.0:
+        force = s.command + within(force - s.command, p.force_rate * h)
+    s.command = force
+
+
+@kernel
+def set_pressure(p, u, s, goal, h):
+    """Pressure follows the feed, at a limited rate."""
+    if p.ratio_on:
+        goal = min(goal, max(p.ratio_lowest, p.ratio_slope * u.feed_force))
+    s.pressure += within(goal - s.pressure, p.pressure_rate * h)
+
+
+@kernel
+def outputs(p, s, w, y):
+    """Present values."""
+    y.force_command, y.pressure_command = s.command, s.pressure
+    y.percussion_on = s.mode != VOID or p.cutback_pressure > 0.0
+    y.mode, y.feed_wanted = s.mode, s.wanted
+    y.seek_centre, y.seek_gradient = s.centres[FEED], s.gradients[FEED]
+    y.seek_pressure_centre, y.seek_pressure_gradient = s.centres[PRESSURE], s.gradients[PRESSURE]
+
+
+LAW = Law(
+    state={
+        "mode": (DRILLING, RETRACT),
+        **dict.fromkeys(
+            ("time", "since", "wanted", "integral", "command", "pressure", "jam_time", "speed"),
+            NUMBER,
+        ),
+        **seeker.STATE,
+    },
+    begin=begin,
+    step=step,
+    outputs=outputs,
+)
 
 TABLE = PartTable(
     name="DrillController",
-    slave=DrillControllerPart,
     description="Feed PI, pressure by feed, cut-back in voids, retract from jams, rate seeking",
     inputs={
         "feed_setpoint": ("N", 0.0, 1e9, 2500.0, "feed force that is wanted"),
@@ -249,4 +215,5 @@ TABLE = PartTable(
         "seek.centre": ("feed_setpoint",),
         "seek.pressure_centre": ("pressure_setpoint",),
     },
+    law=LAW,
 )  # fmt: skip

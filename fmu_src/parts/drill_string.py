@@ -16,13 +16,14 @@ partner; one that swings within a few steps has to lose a few percent a cycle, a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
-from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
-from fmu_src.parts.string_body import Lumps, TakesRods
-from fmu_src.parts.string_waves import Waves
+from fmu_src.parts import string_body as body
+from fmu_src.parts import string_waves as waves
+from fmu_src.parts.part import COUNT, NUMBER, Law, PartTable
+from percussion_model.physics.elementary import exp
+from percussion_model.physics.kernel import kernel
 
+LUMPED = 1  # choice of the model
 # Damping by stiffness and step: 3/2 is the limit, the rest is margin.
 DAMPING_OF_DELAY = 2.0
 # Damping by mass and step: stable below 1/2 with a delay of one step, the rest is margin
@@ -32,216 +33,228 @@ SHARE_OF_MASS = 0.1
 ROUNDING = 1e-9
 # Implicit midpoint is stable at any step, but blind to what is faster [s].
 LONGEST_LUMPED_STEP = 2e-3
+# Numbers of what is refused, by `LAW.faults`.
+TOO_MANY, NO_ROOM, SAVED_TOO_MANY, LAG = 1, 2, 3, 4
 
 
-class DrillString(TakesRods, Model):
-    """String with shoulder.
-
-    Attributes
-    ----------
-    force : float
-        Of the shoulder, on the bit and on the casing, until the next step ends [N].
-    lag : float
-        Time by which the waves stay behind the communication point [s].
-    """
-
-    force: float
-    force_before: float
-    lag: float
-    gap: float
-    bit: float
-    casing_impulse: float
-    head_impulse_due: float
-    casing_impulse_due: float
-    mean_force: float
-    added: int
-    next_rod: float
-    was_asked: bool
-    stiffness: float
-    brought_energy: float
-    brought_momentum: float
-    head_work: float
-    reaction_work: float
-    bit_work: float
-    shoulder_work: float
-    head_impulse: float
-    bit_impulse: float
-    loaded: float
-    time: float
-    body: Any
-    STATE = tuple(__annotations__)
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        super().__init__(parameters)
-        for name in self.STATE:
-            setattr(self, name, 0.0)
-        kind = {"waves": Waves, "lumped": Lumps}[parameters["model"]]
-        self.body = kind(parameters, int(parameters["start.rods"]))
-        self.was_asked = False
-        self._share = 0.0, 0.0  # of a step that the filter of the feed lets through
-        self._allowed = 0.0, (0.0, 0.0)  # stiffness and damping of the shoulder for a step [s]
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Stand still in balance, the shoulder loaded by `start.feed_force`."""
-        self.force = self.mean_force = self.parameters["start.feed_force"]
-        self.force_before = 0.0
-        self.stiffness = self.parameters["shoulder.stiffness"]
-        self.gap = self.force / self.stiffness  # compression at equal displacements [m]
-        self.loaded = 0.5 * self.force**2 / self.stiffness  # energy that is there already [J]
-        self.bit = inputs["bit_position"]
-        self.casing_impulse = inputs["casing_impulse"]
-        casing_weight = self.body.gravity * self.body.casing_mass
-        self.body.rest(self.force - casing_weight)
-        self.next_rod = self.parameters["start.rod_left"]
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Forces act, waves travel, the shoulder finds its new force."""
-        h, body = step_size, self.body
-        reaction = (inputs["casing_impulse"] - self.casing_impulse) / h
-        self.casing_impulse = inputs["casing_impulse"]
-        before = body.head, self.casing_position()
-        self._travel(inputs["head_force"], reaction - self.force, h)
-        self.head_work += inputs["head_force"] * (body.head - before[0])
-        self.head_impulse += inputs["head_force"] * h
-        self.time += h
-        moved = self.casing_position() - before[1]
-        self.reaction_work += reaction * moved
-        self.shoulder_work += self.force * moved
-        self.bit_impulse += self.force * h
-        bit = inputs["bit_position"]
-        # what the bit did is known a step late, as it is in a master that goes by Jacobi
-        self.bit_work += self.force_before * (bit - self.bit)
-        self.force_before = self.force
-        self._update_force((bit - self.bit) / h, bit, h)
-        self.bit = bit
-        if h != self._share[0]:
-            self._share = h, 1.0 - math.exp(-h / self.parameters["feed_filter"])
-        self.mean_force += self._share[1] * (self.force - self.mean_force)
-        self._add_rods(inputs["add_rod"])
-
-    def _travel(self, head_force: float, casing_force: float, h: float) -> None:
-        """Bring the body up to the communication point, or within a cell of it."""
-        body = self.body
-        if isinstance(body, Lumps):
-            count = max(1, math.ceil(h / LONGEST_LUMPED_STEP - ROUNDING))
-            for _ in range(count):
-                body.advance(head_force, casing_force, h / count)
-            return
-        cell, enough = body.step, body.step * (1.0 - ROUNDING)
-        if self.lag + h < enough:
-            self.head_impulse_due += head_force * h
-            self.casing_impulse_due += casing_force * h
-            self.lag += h
-            return
-        # what has acted since the last transit time ended counts in the first one
-        first = cell - self.lag
-        forces = [
-            (
-                (self.head_impulse_due + head_force * first) / cell,
-                (self.casing_impulse_due + casing_force * first) / cell,
-            )
-        ]
-        whole = max(0, math.floor((h - first) / cell + ROUNDING))
-        forces += [(head_force, casing_force)] * whole
-        # Coulomb friction holds what is about to turn, so it has to act after each cell
-        most = 1 if body.sticking > 0.0 else body.cells
-        for begin in range(0, len(forces), most):
-            body.advance(forces[begin : begin + most])
-        self.lag = max(0.0, h - first - whole * cell)
-        self.head_impulse_due = head_force * self.lag
-        self.casing_impulse_due = casing_force * self.lag
-
-    def casing_position(self) -> float:
-        """Displacement of the casing at the communication point [m]."""
-        return self.body.casing + self.body.casing_velocity * self.lag
-
-    def _shoulder(self, h: float) -> tuple[float, float]:
-        """Stiffness [N/m] and damping [N s/m] that a communication step `h` [s] allows."""
-        p = self.parameters
-        k, c = p["shoulder.stiffness"], p["shoulder.damping"]
-        if not p["shoulder.passive"]:
-            return k, c
-        most = SHARE_OF_MASS * p["shoulder.bit_mass"] / h
-        k = min(k, most / (DAMPING_OF_DELAY * h))
-        return k, min(max(c, DAMPING_OF_DELAY * k * h), most)
-
-    def _update_force(self, bit_velocity: float, bit: float, h: float) -> None:
-        """Force of the shoulder for the step to come."""
-        if h != self._allowed[0]:
-            self._allowed = h, self._shoulder(h)
-        k, c = self._allowed[1]
-        if k != self.stiffness:
-            # another step size: the same force at another stiffness
-            softer = 1.0 / k - 1.0 / self.stiffness
-            self.gap += self.force * softer
-            self.loaded += 0.5 * self.force**2 * softer
-            self.stiffness = k
-        compression = self.gap + self.casing_position() - bit
-        if compression <= 0.0:
-            self.force = 0.0
-            return
-        self.force = max(0.0, k * compression + c * (self.body.casing_velocity - bit_velocity))
-
-    def signals(self) -> dict[str, Any]:
-        """What rig, rock, hammer and controller take."""
-        return {
-            "feed_force": self.force,
-            "feed_force_mean": self.mean_force,
-            "head_velocity": self.body.head_velocity,
-        }
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        body = self.body
-        stored_in_shoulder = 0.5 * self.force**2 / self.stiffness
-        return self.signals() | {
-            "head_position": body.head + body.head_velocity * self.lag,
-            "casing_position": self.casing_position(),
-            "casing_velocity": body.casing_velocity,
-            "length": body.count * body.length_of_rod,
-            "weight": body.weight,
-            "rod_wanted": bool(body.head >= self.next_rod),
-            "lifted": self.force == 0.0,
-            "shoulder_stiffness": self.stiffness,
-            "head_impulse": self.head_impulse,
-            "bit_impulse": self.bit_impulse,
-            "momentum": body.momentum - self.brought_momentum,
-            "wall_momentum": body.lost_momentum,
-            "energy.head": self.head_work,
-            "energy.reaction": self.reaction_work,
-            "energy.weight": body.weight_work,
-            "energy.bit": self.bit_work,
-            "energy.shoulder": self.shoulder_work
-            - self.bit_work
-            - (stored_in_shoulder - self.loaded),
-            "energy.wall": body.friction_loss,
-            "energy.stored": body.stored + stored_in_shoulder - self.brought_energy,
-            "rod_count": int(body.count),
-        }
-
-    def state_fault(self, saved: Mapping[str, Any]) -> str:
-        """As in `Model`: the number of rods, what is divided by, and a lag within a cell."""
-        if fault := self.rods_fault(saved):
-            return fault
-        if not saved["stiffness"] > 0.0:
-            return f"stiffness = {saved['stiffness']!r}, which must be above 0 N/m"
-        if not 0.0 <= saved["lag"] <= self.body.step:
-            return f"lag = {saved['lag']!r}, which must be from 0 to {self.body.step!r} s"
-        return ""
-
-    def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a state, which is right."""
-        super().restore(saved)
-        if isinstance(self.body, Lumps):
-            self.body.assemble()
+@kernel
+def moving(p):
+    """Places and velocities of lumps, or waves that go down and up."""
+    return 2 * (p.rod_most + 2 if p.model == LUMPED else p.rod_most * p.rod_cells)
 
 
-DrillStringPart = slave_of(DrillString)
+@kernel
+def made(p):
+    """Room to solve for the velocities of lumps."""
+    return moving(p) if p.model == LUMPED else 0
 
+
+@kernel
+def check(p, facts):
+    """Refuse more rods than there may be."""
+    return TOO_MANY if body.rods_fault(p.start_rods, p.rod_most, facts) else 0
+
+
+@kernel
+def begin(p, u, s, w):
+    """Stand still in balance, the shoulder loaded by `start.feed_force`."""
+    s.count, s.next_rod = p.start_rods, p.start_rod_left
+    s.force = s.mean_force = p.start_feed_force
+    s.stiffness = p.shoulder_stiffness
+    s.gap = s.force / s.stiffness
+    s.loaded = 0.5 * (s.force * s.force) / s.stiffness
+    s.bit, s.casing_impulse = u.bit_position, u.casing_impulse
+    casing_weight = body.gravity_of(p) * p.casing_mass
+    if p.model == LUMPED:
+        body.rest_lumps(p, s, w, s.force - casing_weight)
+    else:
+        waves.rest_waves(p, s, w, s.force - casing_weight)
+
+
+@kernel
+def casing_position(s):
+    """Displacement of the casing at the communication point [m]."""
+    return s.casing + s.casing_velocity * s.lag
+
+
+@kernel
+def step(p, u, s, w, h):
+    """Forces act, waves travel, the shoulder finds its new force."""
+    reaction = (u.casing_impulse - s.casing_impulse) / h
+    s.casing_impulse = u.casing_impulse
+    head, casing = s.head, casing_position(s)
+    if p.model == LUMPED:
+        count = max(1, math.ceil(h / LONGEST_LUMPED_STEP - ROUNDING))
+        for _ in range(count):
+            body.advance_lumps(p, s, w, u.head_force, reaction - s.force, h / count)
+    else:
+        travel(p, s, w, u.head_force, reaction - s.force, h)
+    s.head_work += u.head_force * (s.head - head)
+    s.head_impulse += u.head_force * h
+    s.time += h
+    moved = casing_position(s) - casing
+    s.reaction_work += reaction * moved
+    s.shoulder_work += s.force * moved
+    s.bit_impulse += s.force * h
+    # what the bit did is known a step late, as it is in a master that goes by Jacobi
+    s.bit_work += s.force_before * (u.bit_position - s.bit)
+    s.force_before = s.force
+    update_force(p, s, (u.bit_position - s.bit) / h, u.bit_position, h)
+    s.bit = u.bit_position
+    s.mean_force += (1.0 - exp(-h / p.feed_filter)) * (s.force - s.mean_force)
+    return add_rod(p, s, w) if body.is_wanted(p, u, s) else 0
+
+
+@kernel
+def travel(p, s, w, head_force, casing_force, h):
+    """Bring the waves up to the communication point, or within a cell of it."""
+    grid = waves.grid_of(p)
+    cell = grid.step
+    if s.lag + h < cell * (1.0 - ROUNDING):
+        s.head_impulse_due += head_force * h
+        s.casing_impulse_due += casing_force * h
+        s.lag += h
+        return
+    # what has acted since the last transit time ended counts in the first one
+    first = cell - s.lag
+    whole = max(0, math.floor((h - first) / cell + ROUNDING))
+    on_head = (s.head_impulse_due + head_force * first) / cell
+    on_casing = (s.casing_impulse_due + casing_force * first) / cell
+    # Coulomb friction holds what is about to turn, so it has to act after each cell
+    most = 1 if p.friction_force > 0.0 else s.count * p.rod_cells
+    since = 0
+    for k in range(1 + whole):
+        waves.advance_waves(p, s, w, grid, on_head, on_casing)
+        on_head, on_casing, since = head_force, casing_force, since + 1
+        if since == most or k == whole:
+            waves.rub_waves(p, s, w, grid, since)
+            since = 0
+    s.lag = max(0.0, h - first - whole * cell)
+    s.head_impulse_due = head_force * s.lag
+    s.casing_impulse_due = casing_force * s.lag
+
+
+@kernel
+def shoulder(p, h):
+    """Stiffness [N/m] and damping [N s/m] that a communication step `h` [s] allows."""
+    k, c = p.shoulder_stiffness, p.shoulder_damping
+    if not p.shoulder_passive:
+        return k, c
+    most = SHARE_OF_MASS * p.shoulder_bit_mass / h
+    k = min(k, most / (DAMPING_OF_DELAY * h))
+    return k, min(max(c, DAMPING_OF_DELAY * k * h), most)
+
+
+@kernel
+def update_force(p, s, bit_velocity, bit, h):
+    """Force of the shoulder for the step to come."""
+    k, c = shoulder(p, h)
+    if k != s.stiffness:
+        # another step size: the same force at another stiffness
+        softer = 1.0 / k - 1.0 / s.stiffness
+        s.gap += s.force * softer
+        s.loaded += 0.5 * (s.force * s.force) * softer
+        s.stiffness = k
+    compression = s.gap + casing_position(s) - bit
+    s.force = 0.0
+    if compression > 0.0:
+        s.force = max(0.0, k * compression + c * (s.casing_velocity - bit_velocity))
+
+
+@kernel
+def add_rod(p, s, w):
+    """Add a rod, and book what it brings."""
+    if body.rods_fault(s.count + 1, p.rod_most, w.facts):
+        w.facts[0] = s.count
+        return NO_ROOM
+    stored, momentum = energy_of(p, s, w), momentum_of(p, s, w)
+    if p.model == LUMPED:
+        body.add_lump(p, s, w)
+    else:
+        waves.add_to_waves(p, s, w)
+    s.next_rod += p.rod_length
+    s.brought_energy += energy_of(p, s, w) - stored
+    s.brought_momentum += momentum_of(p, s, w) - momentum
+    return 0
+
+
+@kernel
+def energy_of(p, s, w):
+    """Kinetic and elastic energy of the body [J]."""
+    if p.model == LUMPED:
+        return body.stored_in_lumps(p, s, w)
+    return waves.stored_in_waves(p, s, w)
+
+
+@kernel
+def momentum_of(p, s, w):
+    """Of head, rods and casing [N s]."""
+    return body.momentum_of_lumps(p, s, w) if p.model == LUMPED else waves.momentum_of_waves(p, s)
+
+
+@kernel
+def outputs(p, s, w, y):
+    """Present values."""
+    stored = 0.5 * (s.force * s.force) / s.stiffness
+    y.feed_force, y.feed_force_mean, y.head_velocity = s.force, s.mean_force, s.head_velocity
+    y.head_position = s.head + s.head_velocity * s.lag
+    y.casing_position, y.casing_velocity = casing_position(s), s.casing_velocity
+    y.length, y.weight = s.count * p.rod_length, body.weight_of(p, s.count, p.casing_mass)
+    y.rod_wanted, y.lifted = s.head >= s.next_rod, s.force == 0.0
+    y.shoulder_stiffness = s.stiffness
+    y.head_impulse, y.bit_impulse = s.head_impulse, s.bit_impulse
+    y.momentum = momentum_of(p, s, w) - s.brought_momentum
+    y.wall_momentum = s.lost_momentum
+    y.energy_head, y.energy_reaction, y.energy_weight = s.head_work, s.reaction_work, s.weight_work
+    y.energy_bit = s.bit_work
+    y.energy_shoulder = s.shoulder_work - s.bit_work - (stored - s.loaded)
+    y.energy_wall = s.friction_loss
+    y.energy_stored = energy_of(p, s, w) + stored - s.brought_energy
+    y.rod_count = s.count
+
+
+@kernel
+def state_fault(p, s, w):
+    """Refuse more rods than there is room for, and a lag that is longer than a cell."""
+    if body.rods_fault(s.count, p.rod_most, w.facts):
+        return SAVED_TOO_MANY
+    w.facts[0], w.facts[1] = s.lag, 0.0 if p.model == LUMPED else body.step_of(p)
+    return 0 if s.lag <= w.facts[1] else LAG
+
+
+# Force of the shoulder until the next step ends, and that before it; compression of the shoulder at
+# equal displacements; by how much waves stay behind the communication point, and what has acted
+# since; energies, impulses; sum of all waves. What is divided by is above zero.
+LAW = Law(
+    state={
+        **body.STATE,
+        **dict.fromkeys(
+            ("casing", "casing_velocity", "force", "force_before", "gap", "bit", "casing_impulse",
+             "head_impulse_due", "casing_impulse_due", "mean_force", "head_work", "reaction_work",
+             "bit_work", "shoulder_work", "head_impulse", "bit_impulse", "loaded", "time",
+             "total"),
+            NUMBER,
+        ),
+        "stiffness": (1e-30, NUMBER[1]),
+        "lag": (0.0, NUMBER[1]),
+    },
+    begin=begin,
+    step=step,
+    outputs=outputs,
+    made=made,
+    moving=moving,
+    check=check,
+    state_fault=state_fault,
+    faults=(
+        body.TOO_MANY,
+        body.NO_ROOM,
+        body.SAVED_TOO_MANY,
+        "the saved state has lag = {0:r}, which must be from 0 to {1:r} s",
+    ),
+)  # fmt: skip
 
 TABLE = PartTable(
     name="DrillString",
-    slave=DrillStringPart,
     description="Axial drill string with head, casing and the shoulder that pushes the bit",
     inputs={
         "head_force": ("N", -1e9, 1e9, 0.0, "force of the rig on the head"),
@@ -280,26 +293,13 @@ TABLE = PartTable(
     },
     parameters={
         "model": ("", 0, 0, ("waves", "lumped"), "travelling waves, or a mass for each rod"),
-        "rod.length": ("m", 0.1, 100.0, 3.0, "length of a rod"),
-        "rod.area": ("m^2", 1e-5, 1.0, 2.4e-3, "cross-section of steel"),
-        "rod.density": ("kg/m^3", 100.0, 3e4, 7850.0, "density"),
-        "rod.youngs_modulus": ("Pa", 1e9, 1e12, 2.1e11, "Young's modulus"),
-        "rod.cells": (COUNT, 1, 200, 2, "cells of the wave grid in a rod"),
-        "rod.automatic": ("", 0, 1, True, "whether a rod is added as soon as one is wanted"),
-        "start.rods": (COUNT, 1, 1000, 4, "rods at the start"),
-        "start.rod_left": ("m", 0.0, 100.0, 3.0, "way of the head to the first new rod"),
+        **body.rod_parameters(cells=2),
         "start.feed_force": ("N", 0.0, 1e6, 2500.0, "force of the shoulder at the start"),
-        "head.mass": ("kg", 1.0, 1e5, 300.0, "rotation head with carriage"),
         "casing.mass": ("kg", 0.1, 1e5, 40.0, "casing of the hammer; part of the string"),
         "shoulder.stiffness": ("N/m", 1e3, 1e10, 1e5, "stiffness of shoulder, chuck and damper"),
         "shoulder.damping": ("N s/m", 0.0, 1e7, 200.0, "damping of the same"),
         "shoulder.bit_mass": ("kg", 0.1, 1e4, 8.69, "mass of the bit, for the limit of a step"),
         "shoulder.passive": ("", 0, 1, True, "keep to what a communication step can bear"),
-        "friction.force": ("N/m", 0.0, 1e5, 0.0, "Coulomb friction at the wall by length"),
-        "friction.viscosity": ("N s/m^2", 0.0, 1e5, 20.0, "viscous friction by length"),
-        "fluid_density": ("kg/m^3", 0.0, 3e3, 0.0, "density of the fluid in the hole (buoyancy)"),
-        "gravity": ("m/s^2", -100.0, 100.0, 10.0, "acceleration, down positive"),
-        "feed_filter": ("s", 1e-4, 100.0, 0.1, "time of the filter of feed_force_mean"),
     },
     at_start=dict.fromkeys(
         (
@@ -308,4 +308,5 @@ TABLE = PartTable(
         ),
         (),
     ),
+    law=LAW,
 )  # fmt: skip

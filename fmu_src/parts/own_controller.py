@@ -12,14 +12,15 @@ from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, ModuleType, NoneType
 from typing import Any
 
-from fmu_src.parts import controller
-from fmu_src.parts.part import Model, Part, form_fault
+from fmu_src.parts.python_part import Model, Part, form_fault
 from fmu_src.slave.states import StateError
 from percussion_model.scene.rows import said_among
 
 # Within the resources of the FMU: the file, and the name in it.
 SOURCE, NAME = "controller.py", "controller_name.txt"
-INPUTS = controller.TABLE.inputs
+# Those of the compiled controller, which this one takes the place of.
+INPUTS = ("feed_setpoint", "pressure_setpoint", "feed_force", "rate_of_penetration",
+          "supply_pressure", "blow_frequency", "rotation_torque", "head_velocity")  # fmt: skip
 SIGNALS = "force_command", "pressure_command", "percussion_on"
 # Of an argument, whose bounds nobody knows; whole numbers are those of FMI.
 LARGEST = {bool: 1, int: 2**31 - 1, float: 1e12}

@@ -1,196 +1,115 @@
-"""A part of a drilling system: a plain model, its table of variables, and the slave around it."""
+"""A part of a drilling system: its table of variables, and what computes it.
+
+A part that is compiled has a `Law`: kernels that get records of numbers. In the record of its
+parameters, and in that of its inputs, each variable is a field whose name has underscores for
+dots; rows of numbers such as `layers[2].top` are one field, a matrix.
+"""
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass, field
-from operator import itemgetter
-from typing import Any, ClassVar
+from typing import Any, NamedTuple
 
-from fmu_src.slave.slave import Read, Slave
-from fmu_src.slave.states import Phase, Place, StateError
+import numpy as np
+
+from fmu_src.flat_names import flat_name
 
 Entries = dict[str, tuple[Any, ...]]
 
 COUNT = "count"  # in place of a unit, makes a whole number
 
+# Numbers of a saved state in SI stay below this, so that no product of a few of them overflows.
+LARGEST = 1e60
+NUMBER = (-LARGEST, LARGEST)
+# Whole numbers of a state that counts or tells yes from no.
+FLAG = (0, 1)
+# First field of what moves; as the shell has it (fmu_src/native/state.c).
+IS_READ = "is_read"
 
-class Model:
-    """What a part computes, without FMI.
+_LISTED = re.compile(r"(\w+)\[(\d+)\]\.\w+")
 
-    Parameters
-    ----------
-    parameters : dict
-        Values by name; words for enumerations.
+
+class Room(NamedTuple):
+    """Numbers of a motion whose count follows from parameters.
 
     Attributes
     ----------
-    STATE : tuple of str
-        Attributes that change in a step: numbers, flags, lists of numbers, or objects that have
-        a `STATE` themselves.
+    made, moving : ndarray
+        Those that follow from parameters alone, and those that belong to the state.
+    facts : ndarray, shape (4,)
+        Of what a kernel refuses.
     """
 
-    STATE: ClassVar[tuple[str, ...]] = ()
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        self.parameters = parameters
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Take the state at time zero."""
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Advance by a communication step [s], the inputs held."""
-        raise NotImplementedError
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        raise NotImplementedError
-
-    def signals(self) -> dict[str, Any]:
-        """Those outputs that other parts take; to be cheaper than all."""
-        return self.outputs()
-
-    def save(self) -> dict[str, Any]:
-        """State as plain values; `restore` takes them back."""
-        return dict(plain(self))
-
-    def state_fault(self, saved: Mapping[str, Any]) -> str:
-        """What is wrong with a state from outside, which is of the right form; empty: nothing."""
-        return ""
-
-    def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a state, which is right."""
-        _restore(self, saved)
+    made: np.ndarray
+    moving: np.ndarray
+    facts: np.ndarray
 
 
-# Numbers in SI stay below this, so that no product of a few of them overflows.
-LARGEST = 1e60
+@dataclass(frozen=True)
+class Law:
+    """What a part computes, as kernels.
 
+    They get `p`, the parameters; `u`, the inputs; `s`, the state; `y`, the outputs, to be filled;
+    and `w`, the `Room` for what has a length that follows from parameters. Where one refuses it
+    returns the number of a template, counted from 1, and puts its facts into `w.facts`.
 
-def form_fault(saved: Any, own: Any, name: str = "state") -> str:
-    """Where values from outside are not of the form of a model's own; empty: nowhere.
-
-    Flags are flags, numbers are finite numbers, tables have the same names; lists are of
-    numbers, and of any length.
+    Attributes
+    ----------
+    state : dict of tuple
+        Lowest and highest value of each field, two whole numbers where it is one; and how many
+        numbers there are in it, if it is a row of them.
+    begin : kernel
+        (p, u, s, w): the state at time zero, which is zeros so far.
+    step : kernel
+        (p, u, s, w, h) -> fault: advance by h [s] with the inputs held.
+    outputs : kernel
+        (p, s, w, y).
+    made, moving : kernel
+        (p) -> count of numbers that follow from parameters alone, and that belong to the state.
+    check : kernel, optional
+        (p, facts) -> fault, of parameters that do not go together.
+    make : kernel, optional
+        (p, made): numbers that follow from parameters.
+    state_fault : kernel, optional
+        (p, s, w) -> fault of a state from outside, whose fields are within their limits.
+    faults : tuple of str
+        Templates, as of `percussion_model.engine.fault_texts`.
     """
-    if isinstance(own, dict):
-        if not isinstance(saved, dict) or saved.keys() != own.keys():
-            return f"{name}, which must have {', '.join(own)}"
-        faults = (form_fault(saved[key], own[key], key) for key in own)
-        return next(filter(None, faults), "")
-    if isinstance(own, list):
-        if not isinstance(saved, list) or not all(map(_is_number, saved)):
-            return f"{name}, which must be a list of finite numbers"
-    elif isinstance(own, bool):
-        if not isinstance(saved, bool):
-            return f"{name} = {saved!r:.40}, which must be true or false"
-    elif not _is_number(saved):
-        return f"{name} = {saved!r:.40}, which must be a finite number"
-    return ""
 
+    state: Mapping[str, tuple[Any, ...]]
+    begin: Any
+    step: Any
+    outputs: Any
+    made: Any = None
+    moving: Any = None
+    check: Any = None
+    make: Any = None
+    state_fault: Any = None
+    faults: tuple[str, ...] = ()
 
-def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) <= LARGEST
+    @property
+    def fields(self) -> dict[str, tuple[Any, ...]]:
+        """Fields of the record of what moves."""
+        return {IS_READ: FLAG, **self.state}
 
+    @property
+    def record(self) -> np.dtype:
+        """Type of that record."""
+        return np.dtype(
+            [(name, np.int64 if isinstance(low, int) else np.float64, *count)
+             for name, (low, _, *count) in self.fields.items()]
+        )  # fmt: skip
 
-def plain(value: Any) -> Any:
-    """A number, a list of numbers, or the state of an object, as JSON writes it; a copy."""
-    if hasattr(value, "STATE"):
-        return {name: plain(getattr(value, name)) for name in value.STATE}
-    return value.tolist() if hasattr(value, "tolist") else copy(value)
-
-
-def _restore(owner: Any, saved: Mapping[str, Any]) -> None:
-    """Set what `plain` gave of an object."""
-    for name in owner.STATE:
-        if isinstance(saved[name], dict):
-            _restore(getattr(owner, name), saved[name])
-        else:
-            setattr(owner, name, copy(saved[name]))
-
-
-class Part(Slave):
-    """Slave around the model that the class attribute names."""
-
-    MODEL: ClassVar[type[Model]] = Model
-
-    def __init__(self, **arguments: Any) -> None:
-        super().__init__(**arguments)
-        self.reset()
-
-    def reset(self) -> None:
-        """Make the model anew when it is needed."""
-        self._model: Model | None = None
-        self._found: Mapping[str, Any] | None = None  # outputs that were asked for
-
-    def _parameters(self) -> dict[str, Any]:
-        """Parameters by name, words for enumerations."""
-        return {
-            one.name: self.choice(one.name) if one.type == "Enumeration" else self.values[one.name]
-            for one in self.parameters
-        }
-
-    def initialise(self) -> Model:
-        """The model, made where there is none."""
-        if self._model is None:
-            self._model = self.MODEL(self._parameters())
-            self._model.begin(self.values)
-            self._found = None
-        return self._model
-
-    def step(self, time: float, step_size: float) -> None:
-        """Advance with the present inputs."""
-        (self._model or self.initialise()).step(self.values, step_size)
-        self._found = None
-
-    def reader(self, names: list[str]) -> Read:
-        """What gives the present values of these outputs; 0 before there are any."""
-        pick = itemgetter(*names) if len(names) > 1 else lambda found: [found[n] for n in names]
-
-        def read(part: Part) -> list[Any]:
-            found = part._found
-            if found is None:
-                if part._model is None and part.phase != Phase.INITIALISING:
-                    return [0] * len(names)
-                found = part._found = part.initialise().signals()
-            try:
-                return list(pick(found))
-            except KeyError:  # one that no other part takes
-                found = part._found = part.initialise().outputs()
-            return list(pick(found))
-
-        return read
-
-    def identity(self) -> Any:
-        """Sources, whose hash is in the name of the module, and names of the variables."""
-        return [type(self).__module__, type(self).__name__, list(self.by_name)]
-
-    def save(self) -> bytes:
-        """State of the model."""
-        return json.dumps(self.initialise().save()).encode()
-
-    def restore(self, values: dict[str, Any], place: Place, saved: bytes, own: bool) -> None:
-        """Go back to a motion; as in `Slave`."""
-        try:
-            found = json.loads(saved)
-        except (ValueError, RecursionError) as error:
-            raise StateError(f"the saved state cannot be read: {error}") from None
-        model = self._model
-        if model is None:
-            model = self.MODEL(self._parameters())
-            model.begin(values)
-        if not own and (fault := form_fault(found, model.save()) or model.state_fault(found)):
-            raise StateError(f"the saved state has {fault}")
-        model.restore(found)
-        self._model, self._found = model, None
-
-
-def slave_of(model: type[Model]) -> type[Part]:
-    """Slave around a model; FMUs find it in the model's module, by this name."""
-    names = {"MODEL": model, "__module__": model.__module__, "__doc__": model.__doc__}
-    return type(f"{model.__name__}Part", (Part,), names)
+    @property
+    def words(self) -> list[tuple[str, float, float, bool]]:
+        """Name and limits of each word of that record, and whether it is a whole number."""
+        return [
+            (name, low, high, isinstance(low, int))
+            for name, (low, high, *count) in self.fields.items()
+            for _ in range(*count or (1,))
+        ]
 
 
 @dataclass(frozen=True)
@@ -206,17 +125,41 @@ class PartTable:
     ----------
     name : str
         Of the FMU.
-    slave : type
-        What runs in it.
     at_start : dict of tuple
         Inputs that an output depends on at the start, beside parameters; outputs that are
         left out are the same at every start.
+    law : Law, optional
+        Of a part that is compiled.
+    slave : type, optional
+        What runs in the FMU of another one, by Python.
     """
 
     name: str
-    slave: type[Part]
     description: str
     inputs: Entries
     outputs: Entries
     parameters: Entries
     at_start: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    law: Law | None = None
+    slave: Any = None
+
+
+def record_of(entries: Entries) -> np.dtype:
+    """Type of the record that kernels see of parameters or inputs, in their order."""
+    fields: dict[str, list[Any]] = {}
+    for name, (unit, _, _, start, _) in entries.items():
+        whole = isinstance(start, (bool, tuple)) or unit == COUNT
+        listed = _LISTED.fullmatch(name)
+        row = fields.setdefault(listed[1] if listed else flat_name(name), [np.float64, {}])
+        row[0] = np.int64 if whole else np.float64
+        number = listed[2] if listed else ""
+        row[1][number] = row[1].get(number, 0) + 1
+    return np.dtype(
+        [(name, kind, (len(counts), counts["1"])) if "1" in counts else (name, kind)
+         for name, (kind, counts) in fields.items()]
+    )  # fmt: skip
+
+
+def record_of_outputs(entries: Entries) -> np.dtype:
+    """Type of the record of outputs, all numbers to the shell."""
+    return np.dtype([(flat_name(name), np.float64) for name in entries])

@@ -9,79 +9,75 @@ from the servo's time constant. Friction of the slide brakes the head: -c v.
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from fmu_src.parts.part import Model, PartTable, slave_of
+from fmu_src.parts.part import FLAG, NUMBER, Law, PartTable
+from percussion_model.physics.kernel import inlined, kernel
 
 LONGEST_STEP = 1e-3  # of the integration, short against the servo [s]
 
 
-class RigFeed(Model):
-    """Cylinder with servo valve."""
-
-    STATE = ("pressure", "relief_volume", "energy", "speed", "limited")
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        super().__init__(parameters)
-        p = parameters
-        self.area = p["cylinder.area"]
-        self.capacity = p["cylinder.volume"] / p["cylinder.bulk_modulus"]
-        self.gain = self.capacity / p["servo.time"]
-        self.flow_limit = p["servo.velocity"] * self.area
-        self.highest = p["force_limit"] / self.area
-        self.leak, self.friction = p["cylinder.leakage"], p["slide.friction"]
-        self.pressure = self.relief_volume = self.energy = self.speed = 0.0
-        self.limited = False
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Start with the force that is wanted."""
-        self.pressure = self.parameters["start.force"] / self.area
-        self.speed = inputs["head_velocity"]
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Integrate the pressure, implicit in the flow of the valve."""
-        highest, speed = self.highest, inputs["head_velocity"]
-        wanted = min(max(inputs["force_command"] / self.area, -highest), highest)
-        self.speed = speed
-        count = max(1, math.ceil(step_size / LONGEST_STEP))
-        h = step_size / count
-        share = h / self.capacity  # pressure for a flow
-        for _ in range(count):
-            held = self.pressure - share * self.area * speed
-            new = (held + share * self.gain * wanted) / (1.0 + share * (self.gain + self.leak))
-            flow = self.gain * (wanted - new)
-            self.limited = abs(flow) > self.flow_limit
-            if self.limited:
-                flow = math.copysign(self.flow_limit, flow)
-                new = (held + share * flow) / (1.0 + share * self.leak)
-            clipped = min(max(new, -highest), highest)
-            self.relief_volume += self.capacity * abs(new - clipped)
-            self.energy += h * flow * clipped
-            self.pressure = clipped
-
-    def signals(self) -> dict[str, Any]:
-        """What the string takes."""
-        return {
-            "force": self.area * self.pressure - self.friction * self.speed,
-            "rotation_speed": self.parameters["rotation.speed"],
-        }
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        return self.signals() | {
-            "pressure": self.pressure,
-            "energy": self.energy,
-            "relief_volume": self.relief_volume,
-            "limited": self.limited,
-        }
+@kernel
+def begin(p, u, s, w):
+    """Start with the force that is wanted."""
+    s.pressure = p.start_force / p.cylinder_area
+    s.speed = u.head_velocity
 
 
-RigFeedPart = slave_of(RigFeed)
+@inlined
+def kept(value, least, most):
+    """The value within bounds."""
+    return min(max(value, least), most)
 
+
+@kernel
+def step(p, u, s, w, h):
+    """Integrate the pressure, implicit in the flow of the valve."""
+    area, leak, speed = p.cylinder_area, p.cylinder_leakage, u.head_velocity
+    capacity = p.cylinder_volume / p.cylinder_bulk_modulus
+    gain, flow_limit, highest = (
+        capacity / p.servo_time,
+        p.servo_velocity * area,
+        p.force_limit / area,
+    )
+    wanted = kept(u.force_command / area, -highest, highest)
+    s.speed = speed
+    count = max(1, math.ceil(h / LONGEST_STEP))
+    h = h / count
+    share = h / capacity  # pressure for a flow
+    for _ in range(count):
+        held = s.pressure - share * area * speed
+        new = (held + share * gain * wanted) / (1.0 + share * (gain + leak))
+        flow = gain * (wanted - new)
+        s.limited = abs(flow) > flow_limit
+        if s.limited:
+            flow = math.copysign(flow_limit, flow)
+            new = (held + share * flow) / (1.0 + share * leak)
+        clipped = kept(new, -highest, highest)
+        s.relief_volume += capacity * abs(new - clipped)
+        s.energy += h * flow * clipped
+        s.pressure = clipped
+    return 0
+
+
+@kernel
+def outputs(p, s, w, y):
+    """Present values."""
+    y.force = p.cylinder_area * s.pressure - p.slide_friction * s.speed
+    y.rotation_speed = p.rotation_speed
+    y.pressure, y.energy, y.relief_volume = s.pressure, s.energy, s.relief_volume
+    y.limited = s.limited
+
+
+LAW = Law(
+    state=dict.fromkeys(("pressure", "relief_volume", "energy", "speed"), NUMBER)
+    | {"limited": FLAG},
+    begin=begin,
+    step=step,
+    outputs=outputs,
+)
 
 TABLE = PartTable(
     name="RigFeed",
-    slave=RigFeedPart,
     description="Hydraulic cylinder with servo valve, which pushes the head",
     inputs={
         "force_command": ("N", -1e9, 1e9, 0.0, "force that is wanted on the head"),
@@ -108,4 +104,5 @@ TABLE = PartTable(
         "start.force": ("N", -1e6, 1e6, 0.0, "force at the start"),
     },
     at_start={"force": ("head_velocity",), "rotation_speed": (), "pressure": ()},
+    law=LAW,
 )  # fmt: skip

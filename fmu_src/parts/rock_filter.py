@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.parts.part import COUNT, Entries, Model, PartTable, slave_of
+from fmu_src.parts.part import COUNT, Entries, PartTable
+from fmu_src.parts.python_part import Model, slave_of
 from percussion_model.analysis.identify.filter import RockFilter as Filter
 from percussion_model.analysis.identify.observation import SETTINGS, SIGNALS, UNKNOWNS, Q
 from percussion_model.analysis.identify.part import AXES, POWERS, ROWS, from_numbers

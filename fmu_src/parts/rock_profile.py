@@ -12,114 +12,111 @@ The torque on the rotation is r f F.
 from __future__ import annotations
 
 import math
-import random
-from bisect import bisect_right
-from typing import Any
 
-from fmu_src.parts.part import COUNT, Entries, Model, PartTable, slave_of
+from fmu_src.parts.part import COUNT, NUMBER, Entries, Law, PartTable
+from percussion_model.physics.elementary import cos, exp, log
+from percussion_model.physics.kernel import kernel
 
 LAYERS = 6
-# Knots of the variation that are kept, by number.
-MOST_KNOTS = 64
+TOP, STIFFNESS, RATIO, TORQUE, ENERGY = range(5)
+DEEPEST = 1e8  # of a state from outside [m]
+# Of a whole number of 32 bits: all, and how many there are.
+MASK, ALL = 0xFFFFFFFF, 4294967296.0
 
 
-class RockProfile(Model):
-    """What the bit meets at its depth."""
-
-    STATE = ("depth", "feed", "pressure", "torque")
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        super().__init__(parameters)
-        layers = [self._layer(number) for number in range(1, LAYERS + 1)]
-        # without any layer all is rock of the first one
-        self.layers = sorted(layer for layer in layers if layer[0] >= 0.0) or layers[:1]
-        self.tops = [layer[0] for layer in self.layers]
-        self.depth = self.feed = self.pressure = self.torque = 0.0
-        self._knots: dict[int, float] = {}
-        self._spread = parameters["variation.spread"]
-        self._length = parameters["variation.length"]
-        # number of the knot above the bit, none yet, and the values of it and the next
-        self._between: tuple[int | None, float, float] = (None, 0.0, 0.0)
-        self._arm = parameters["torque_arm"]
-
-    def _layer(self, number: int) -> tuple[float, float, float, float, float, int]:
-        """Top [m], K_R [N/m], gamma, torque factor, e_c [J/m^3] and number of a layer."""
-        top, *numbers = (self.parameters[f"layers[{number}].{name}"] for name in _LAYER)
-        return top, *numbers, number
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Look at the rock below the bit."""
-        self.depth = self.parameters["start.depth"] + inputs["bit_position"]
-        self._hold(inputs)
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Follow the bit; rock that was drilled does not come back."""
-        here = self.parameters["start.depth"] + inputs["bit_position"]
-        self.depth = max(self.depth, here)
-        self._hold(inputs)
-
-    def _hold(self, inputs: dict[str, Any]) -> None:
-        self.feed, self.pressure = inputs["feed_force"], inputs["supply_pressure"]
-        self.torque = inputs["bit_torque"]
-
-    def variation(self, depth: float) -> float:
-        """The factor exp(s n - s^2/2) at a depth [m]."""
-        s = self._spread
-        if s == 0.0:
-            return 1.0
-        place = depth / self._length
-        above = math.floor(place)
-        if above != self._between[0]:
-            self._between = above, self._knot(above), self._knot(above + 1)
-        share = place - above
-        _, low, high = self._between
-        # straight between knots, with the spread kept
-        n = ((1.0 - share) * low + share * high) / math.hypot(1.0 - share, share)
-        return math.exp(s * n - 0.5 * s * s)
-
-    def _knot(self, number: int) -> float:
-        if number not in self._knots:
-            if len(self._knots) > MOST_KNOTS:
-                self._knots.clear()
-            seed = f"{int(self.parameters['variation.seed'])}:{number}"
-            self._knots[number] = random.Random(seed).gauss(0.0, 1.0)
-        return self._knots[number]
-
-    def _layer_at_depth(self) -> tuple[float, float, float, float, float, int]:
-        return self.layers[max(0, bisect_right(self.tops, self.depth) - 1)]
-
-    def _quadratic_factor(self, value: float, name: str, best: str) -> float:
-        """Factor on the stiffness that is least at the best feed, or pressure."""
-        factor = self.parameters[f"{name}.factor"]
-        if factor == 0.0:
-            return 1.0
-        off = value / self.parameters[f"{name}.{best}"] - 1.0
-        return 1.0 + factor * off * off
-
-    def signals(self) -> dict[str, Any]:
-        """What hammer and controller take."""
-        _, stiffness, ratio, torque, energy, _ = self._layer_at_depth()
-        factor = self.variation(self.depth)
-        factor *= self._quadratic_factor(self.feed, "best_feed", "force")
-        factor *= self._quadratic_factor(self.pressure, "best_pressure", "pressure")
-        return {
-            "loading_stiffness": stiffness * factor,
-            "unloading_ratio": ratio,
-            "crushing_energy": energy,
-            "rotation_torque": self._arm * torque * self.feed + self.torque,
-        }
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        _, stiffness, *_, which = self._layer_at_depth()
-        return self.signals() | {
-            "depth": self.depth,
-            "in_void": stiffness <= self.parameters["void_stiffness"],
-            "layer": which,
-        }
+@kernel
+def begin(p, u, s, w):
+    """Look at the rock below the bit."""
+    s.depth = p.start_depth + u.bit_position
+    hold(u, s)
 
 
-RockProfilePart = slave_of(RockProfile)
+@kernel
+def step(p, u, s, w, h):
+    """Follow the bit; rock that was drilled does not come back."""
+    s.depth = max(s.depth, p.start_depth + u.bit_position)
+    hold(u, s)
+    return 0
+
+
+@kernel
+def hold(u, s):
+    """Keep what the stiffness depends on."""
+    s.feed, s.pressure, s.torque = u.feed_force, u.supply_pressure, u.bit_torque
+
+
+@kernel
+def layer_at(p, depth):
+    """Row of the layer at a depth [m]; without any layer all is rock of the first one."""
+    found, first = -1, -1
+    for k in range(LAYERS):
+        top = p.layers[k, TOP]
+        if top < 0.0:
+            continue
+        if first < 0 or top < p.layers[first, TOP]:
+            first = k
+        if top <= depth and (found < 0 or top >= p.layers[found, TOP]):
+            found = k
+    return max(found if found >= 0 else first, 0)
+
+
+@kernel
+def mixed(x):
+    """A whole number of 32 bits that knows nothing of this one (MurmurHash3, A. Appleby)."""
+    x = ((x ^ (x >> 16)) * 0x85EBCA6B) & MASK
+    x = ((x ^ (x >> 13)) * 0xC2B2AE35) & MASK
+    return x ^ (x >> 16)
+
+
+@kernel
+def knot(seed, number):
+    """Normal variable of a knot, the same for the same seed (Box and Muller, 1958)."""
+    x = mixed(mixed(mixed(seed) ^ (number & MASK)) ^ ((number >> 32) & MASK))
+    size = math.sqrt(-2.0 * log((mixed(x ^ 1) + 1) / ALL))
+    return size * cos(2.0 * math.pi * (mixed(x ^ 2) / ALL))
+
+
+@kernel
+def variation(p, depth):
+    """The factor exp(s n - s^2/2) at a depth [m]."""
+    spread = p.variation_spread
+    if spread == 0.0:
+        return 1.0
+    place = depth / p.variation_length
+    above = math.floor(place)
+    share, seed = place - above, p.variation_seed
+    n = (1.0 - share) * knot(seed, above) + share * knot(seed, above + 1)
+    # straight between knots, with the spread kept
+    n = n / math.sqrt((1.0 - share) * (1.0 - share) + share * share)
+    return exp(spread * n - 0.5 * spread * spread)
+
+
+@kernel
+def growth(value, best, factor):
+    """Factor on the stiffness, which is least at the best feed or pressure."""
+    off = value / best - 1.0
+    return 1.0 + factor * off * off
+
+
+@kernel
+def outputs(p, s, w, y):
+    """Present values."""
+    k = layer_at(p, s.depth)
+    factor = variation(p, s.depth) * growth(s.feed, p.best_feed_force, p.best_feed_factor)
+    factor *= growth(s.pressure, p.best_pressure_pressure, p.best_pressure_factor)
+    y.loading_stiffness = p.layers[k, STIFFNESS] * factor
+    y.unloading_ratio, y.crushing_energy = p.layers[k, RATIO], p.layers[k, ENERGY]
+    y.rotation_torque = p.torque_arm * p.layers[k, TORQUE] * s.feed + s.torque
+    y.depth, y.layer = s.depth, k + 1
+    y.in_void = p.layers[k, STIFFNESS] <= p.void_stiffness
+
+
+LAW = Law(
+    state={"depth": (-DEEPEST, DEEPEST), **dict.fromkeys(("feed", "pressure", "torque"), NUMBER)},
+    begin=begin,
+    step=step,
+    outputs=outputs,
+)
 
 
 _LAYER = {
@@ -147,7 +144,6 @@ def _layers() -> Entries:
 
 TABLE = PartTable(
     name="RockProfile",
-    slave=RockProfilePart,
     description="Rock by depth: layers, voids, random variation, stiffness by feed",
     inputs={
         "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
@@ -186,4 +182,5 @@ TABLE = PartTable(
         "in_void": ("bit_position",),
         "layer": ("bit_position",),
     },
+    law=LAW,
 )

@@ -10,125 +10,116 @@ They move the logarithm of the two centres by a limited amount.
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Mapping
-from typing import Any
+
+from fmu_src.parts.part import FLAG, NUMBER
+from percussion_model.physics.elementary import cos_and_sin, exp, sin
+from percussion_model.physics.kernel import kernel
 
 FEED, PRESSURE = 0, 1
 # Less than this share of the product of both swings: they cannot be told apart.
 ALIKE = 1e-6
+# Feed, pressure and rate at both frequencies, each a real and an imaginary number.
+MEASURED, WAVES = 3, 12
+# Sums in a window, the same at both frequencies; feed [N] and pressure [Pa] about which the seeker
+# swings; logarithmic slopes of the rate, as found last. Windows that begin after `pause_end` count.
+STATE = {
+    "phase": NUMBER,
+    "pause_end": NUMBER,
+    "counts": FLAG,
+    "sums": (*NUMBER, MEASURED),
+    "waves": (*NUMBER, WAVES),
+    "centres": (*NUMBER, 2),
+    "gradients": (*NUMBER, 2),
+}
 
 
-class Seeker:
-    """Centres of feed and pressure, and what is summed up in a window.
+@kernel
+def restart(s):
+    """Begin a window."""
+    s.phase = 0.0
+    for i in range(MEASURED):
+        s.sums[i] = 0.0
+    for i in range(WAVES):
+        s.waves[i] = 0.0
 
-    Attributes
-    ----------
-    centres : list of float
-        Feed [N] and pressure [Pa] about which the seeker swings.
-    since : float
-        Windows that begin after this time count [s].
-    gradients : list of float
-        Logarithmic slopes of the rate, as found last.
-    """
 
-    phase: float
-    since: float
-    counts: bool
-    sums: list[float]
-    waves: list[float]
-    centres: list[float]
-    gradients: list[float]
-    STATE = tuple(__annotations__)
+@kernel
+def pause(p, s):
+    """Lose the present window, and count none that begins before the wait is over."""
+    s.pause_end = s.time + p.seek_wait
+    restart(s)
 
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        self.parameters = parameters
-        self.cycles = (1, int(parameters["seek.pressure_cycles"]))
-        self.centres, self.gradients = [0.0, 0.0], [0.0, 0.0]
-        self.pause(0.0)
-        self.counts = False
 
-    def pause(self, time: float) -> None:
-        """Lose the present window, and count none that begins before the wait is over."""
-        self.since = time + self.parameters["seek.wait"]
-        self._restart()
+@kernel
+def sample(p, u, s, h):
+    """Take a sample of the inputs; return the feed [N] and the pressure [Pa] to be kept."""
+    if s.phase == 0.0:
+        s.counts = s.time > s.pause_end
+    s.phase += h
+    angle = 2.0 * math.pi * s.phase / p.seek_period
+    values = u.feed_force, u.supply_pressure, u.rate_of_penetration
+    for k in range(2):
+        cosine, sine = cos_and_sin((p.seek_pressure_cycles if k == 1 else 1) * angle)
+        for i in range(MEASURED):
+            s.waves[6 * k + 2 * i] += values[i] * cosine
+            s.waves[6 * k + 2 * i + 1] -= values[i] * sine
+    for i in range(MEASURED):
+        s.sums[i] += values[i]
+    if s.phase >= p.seek_period - 0.5 * h:
+        if s.counts:
+            climb(p, s)
+        restart(s)
+        angle = 0.0
+    feed = s.centres[FEED] * (1.0 + p.seek_swing * sin(angle))
+    swing = p.seek_pressure_swing if p.seek_pressure_on else 0.0
+    return feed, s.centres[PRESSURE] * (1.0 + swing * sin(p.seek_pressure_cycles * angle))
 
-    def _restart(self) -> None:
-        self.phase = 0.0
-        self.sums = [0.0] * 3  # feed, pressure, rate
-        self.waves = [0.0] * 12  # the same at both frequencies, real and imaginary
 
-    def sample(self, inputs: Mapping[str, Any], time: float, h: float) -> tuple[float, float]:
-        """Take a sample of the inputs; return the feed [N] and the pressure [Pa] to be kept."""
-        p = self.parameters
-        if self.phase == 0.0:
-            self.counts = time > self.since
-        self.phase += h
-        angle = 2.0 * math.pi * self.phase / p["seek.period"]
-        values = inputs["feed_force"], inputs["supply_pressure"], inputs["rate_of_penetration"]
-        for k, cycles in enumerate(self.cycles):
-            turn = cmath.exp(-1j * cycles * angle)
-            for i, value in enumerate(values):
-                self.waves[6 * k + 2 * i] += value * turn.real
-                self.waves[6 * k + 2 * i + 1] += value * turn.imag
-        for i, value in enumerate(values):
-            self.sums[i] += value
-        if self.phase >= p["seek.period"] - 0.5 * h:
-            if self.counts:
-                self._climb()
-            self._restart()
-            angle = 0.0
-        feed = self.centres[FEED] * (1.0 + p["seek.swing"] * math.sin(angle))
-        swing = p["seek.pressure_swing"] if p["seek.pressure_on"] else 0.0
-        return feed, self.centres[PRESSURE] * (1.0 + swing * math.sin(self.cycles[1] * angle))
+@kernel
+def product(s, i, j):
+    """Sum over both frequencies of the products of two relative swings, as far as in phase."""
+    total = 0.0
+    for k in range(2):
+        at, of = 6 * k + 2 * i, 6 * k + 2 * j
+        real = s.waves[at] / s.sums[i] * (s.waves[of] / s.sums[j])
+        total += real + s.waves[at + 1] / s.sums[i] * (s.waves[of + 1] / s.sums[j])
+    return total
 
-    def _climb(self) -> None:
-        """Move the centres by the slopes of the window that has ended."""
-        p = self.parameters
-        if min(self.sums) <= 0.0:
+
+@kernel
+def in_phase(s, i, j):
+    """Product of two relative swings at the first frequency."""
+    real = s.waves[2 * i] / s.sums[i] * (s.waves[2 * j] / s.sums[j])
+    return real + s.waves[2 * i + 1] / s.sums[i] * (s.waves[2 * j + 1] / s.sums[j])
+
+
+@kernel
+def climb(p, s):
+    """Move the centres by the slopes of the window that has ended."""
+    if min(min(s.sums[0], s.sums[1]), s.sums[2]) <= 0.0:
+        return
+    if p.seek_pressure_on:
+        # real slopes over feed and pressure that explain the rate best
+        aa, bb, ab = product(s, 0, 0), product(s, 1, 1), product(s, 0, 1)
+        ra, rb = product(s, 2, 0), product(s, 2, 1)
+        spread = aa * bb - ab * ab
+        if spread <= ALIKE * aa * bb:
             return
-        # relative swings: of each quantity at both frequencies
-        found = [
-            [
-                complex(self.waves[6 * k + 2 * i], self.waves[6 * k + 2 * i + 1]) / self.sums[i]
-                for k in range(2)
-            ]
-            for i in range(3)
-        ]
-        feed, pressure, rate = found
-        if p["seek.pressure_on"]:
-            slopes = _two_slopes(feed, pressure, rate)
-            if slopes is None:
-                return
-            self.gradients = list(slopes)
-            self._move(PRESSURE, "pressure_gain", "pressure_lowest", "pressure_highest")
-        else:
-            own = abs(feed[0]) ** 2
-            if own == 0.0:
-                return
-            self.gradients[FEED] = (rate[0] * feed[0].conjugate()).real / own
-        self._move(FEED, "gain", "lowest", "highest")
-
-    def _move(self, which: int, gain: str, lowest: str, highest: str) -> None:
-        p = self.parameters
-        most = p["seek.largest_move"]
-        move = min(max(p[f"seek.{gain}"] * self.gradients[which], -most), most)
-        moved = self.centres[which] * math.exp(move)
-        self.centres[which] = min(max(moved, p[f"seek.{lowest}"]), p[f"seek.{highest}"])
+        s.gradients[FEED] = (ra * bb - rb * ab) / spread
+        s.gradients[PRESSURE] = (rb * aa - ra * ab) / spread
+        move(p, s, PRESSURE, p.seek_pressure_gain, p.seek_pressure_lowest, p.seek_pressure_highest)
+    else:
+        own = in_phase(s, 0, 0)
+        if own == 0.0:
+            return
+        s.gradients[FEED] = in_phase(s, 2, 0) / own
+    move(p, s, FEED, p.seek_gain, p.seek_lowest, p.seek_highest)
 
 
-def _two_slopes(
-    feed: list[complex], pressure: list[complex], rate: list[complex]
-) -> tuple[float, float] | None:
-    """Real slopes over feed and pressure that explain the rate best; none if they are alike."""
-    aa, bb = _product(feed, feed), _product(pressure, pressure)
-    ab, ra, rb = _product(feed, pressure), _product(rate, feed), _product(rate, pressure)
-    spread = aa * bb - ab * ab
-    if spread <= ALIKE * aa * bb:
-        return None
-    return (ra * bb - rb * ab) / spread, (rb * aa - ra * ab) / spread
-
-
-def _product(one: list[complex], other: list[complex]) -> float:
-    return sum((a * b.conjugate()).real for a, b in zip(one, other, strict=True))
+@kernel
+def move(p, s, which, gain, lowest, highest):
+    """Move the logarithm of a centre by a limited amount."""
+    most = p.seek_largest_move
+    moved = s.centres[which] * exp(min(max(gain * s.gradients[which], -most), most))
+    s.centres[which] = min(max(moved, lowest), highest)

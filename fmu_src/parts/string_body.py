@@ -1,269 +1,239 @@
-"""Body of a drill string between two end masses: what all have in common, and lumped masses.
+"""Rods of a drill string between two ends: what all strings share, and lumped masses.
 
-Bodies take the force on the head and on the casing (down positive), and know the
-displacements and velocities of the two ends. Weight and wall friction act on the way.
+Bodies take the force on the head and on the casing (down positive), and know displacements and
+velocities of both ends. Weight and wall friction act on the way.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import NamedTuple
 
-import numpy as np
+from fmu_src.parts.part import COUNT, FLAG, NUMBER, Entries
+from percussion_model.physics.kernel import kernel
 
-# A saved string of more rods is refused: their lumps would need matrices of this size squared.
+# A saved string, or one that goes on adding rods, has no more.
 MOST_RODS = 2000
+# Rods; displacement of the head [m], its velocity [m/s]; energy that the wall has taken and
+# work of the weight [J], momentum that the wall has taken [N s]; displacement
+# of the head at which the next is wanted [m], whether one was asked for in the step before; energy
+# and momentum of new rods.
+STATE = {
+    "count": (1, MOST_RODS),
+    **dict.fromkeys(
+        ("head", "head_velocity", "friction_loss", "weight_work", "lost_momentum", "next_rod",
+         "brought_energy", "brought_momentum"),
+        NUMBER,
+    ),
+    "was_asked": FLAG,
+}  # fmt: skip
+# What is refused of rods: how many there are, and how many there may be.
+NO_ROOM = "the string has {0:d} rods and wants one more: rod.most must be above {1:d}"
+TOO_MANY = "start.rods = {0:d}: must be at most rod.most, which is {1:d}"
+SAVED_TOO_MANY = "the saved state has {0:d} rods, which must be at most rod.most, {1:d}"
 
 
-class Rods:
-    """What both bodies share: material, masses, forces along the wall.
+def rod_parameters(cells: int) -> Entries:
+    """Rows of the parameters that all strings have, with the cells of a rod at the start."""
+    return {
+        "rod.length": ("m", 0.1, 100.0, 3.0, "length of a rod"),
+        "rod.area": ("m^2", 1e-5, 1.0, 2.4e-3, "cross-section of steel"),
+        "rod.density": ("kg/m^3", 100.0, 3e4, 7850.0, "density"),
+        "rod.youngs_modulus": ("Pa", 1e9, 1e12, 2.1e11, "Young's modulus"),
+        "rod.cells": (COUNT, 1, 200, cells, "cells of the wave grid in a rod"),
+        "rod.automatic": ("", 0, 1, True, "whether a rod is added as soon as one is wanted"),
+        "rod.most": (COUNT, 1, MOST_RODS, 100, "rods that there may come to be"),
+        "start.rods": (COUNT, 1, 1000, 4, "rods at the start"),
+        "start.rod_left": ("m", 0.0, 100.0, 3.0, "way of the head to the first new rod"),
+        "head.mass": ("kg", 1.0, 1e5, 300.0, "rotation head with carriage"),
+        "friction.force": ("N/m", 0.0, 1e5, 0.0, "Coulomb friction at the wall by length"),
+        "friction.viscosity": ("N s/m^2", 0.0, 1e5, 20.0, "viscous friction by length"),
+        "fluid_density": ("kg/m^3", 0.0, 3e3, 0.0, "density of the fluid in the hole (buoyancy)"),
+        "gravity": ("m/s^2", -100.0, 100.0, 10.0, "acceleration, down positive"),
+        "feed_filter": ("s", 1e-4, 100.0, 0.1, "time of the filter of feed_force_mean"),
+    }
 
-    Parameters
-    ----------
-    parameters : dict
-        Of the drill string, by name.
-    count : int
-        Rods at the start.
 
-    Attributes
-    ----------
-    head, casing : float
-        Displacements, down positive [m].
-    head_velocity, casing_velocity : float
-        [m/s]
-    friction_loss, weight_work, lost_momentum : float
-        Energy taken by the wall, work of the weight [J], momentum taken by the wall [N s].
+@kernel
+def rods_fault(count, most, facts):
+    """Whether there are more rods than there is room for; fills the facts."""
+    facts[0], facts[1] = count, most
+    return count > most
+
+
+@kernel
+def impedance_of(p):
+    """Impedance of the rods [N s/m]."""
+    return p.rod_area * math.sqrt(p.rod_youngs_modulus * p.rod_density)
+
+
+@kernel
+def step_of(p):
+    """Time in which a wave crosses a cell [s]."""
+    return p.rod_length / p.rod_cells / math.sqrt(p.rod_youngs_modulus / p.rod_density)
+
+
+@kernel
+def cell_mass_of(p):
+    """Mass of a cell [kg]."""
+    return p.rod_density * p.rod_area * (p.rod_length / p.rod_cells)
+
+
+@kernel
+def gravity_of(p):
+    """Acceleration of what is in the hole, less buoyancy [m/s^2]."""
+    return p.gravity * (1.0 - p.fluid_density / p.rod_density)
+
+
+@kernel
+def weight_of(p, count, casing_mass):
+    """Weight of head, rods and casing, less buoyancy [N]."""
+    rods = p.rod_density * p.rod_area * p.rod_length * count
+    return p.gravity * p.head_mass + gravity_of(p) * (rods + casing_mass)
+
+
+@kernel
+def is_wanted(p, u, s):
+    """Whether a rod is to be added: on the rising edge of `add_rod`, or where the head is down."""
+    asked = bool(u.add_rod)
+    wanted = s.head >= s.next_rod and (bool(p.rod_automatic) or (asked and not s.was_asked))
+    s.was_asked = asked
+    return wanted
+
+
+@kernel
+def rubbed(p, s, v, mass, length, h):
+    """Velocity of a piece after a step of wall friction, whose loss is booked.
+
+    Coulomb friction stops a piece at most, viscous friction is implicit:
+    m v' = -s L sign(v) - c L v.
     """
-
-    STATE: ClassVar[tuple[str, ...]] = (
-        "count", "head", "casing", "head_velocity", "casing_velocity", "friction_loss",
-        "weight_work", "lost_momentum",
-    )  # fmt: skip
-
-    def __init__(self, parameters: dict[str, Any], count: int) -> None:
-        p = parameters
-        self.count = count
-        self.length_of_rod = p["rod.length"]
-        self.area, self.density = p["rod.area"], p["rod.density"]
-        self.modulus = p["rod.youngs_modulus"]
-        self.speed = math.sqrt(self.modulus / self.density)
-        self.impedance = self.area * math.sqrt(self.modulus * self.density)
-        buoyancy = p["fluid_density"] / self.density
-        self.gravity = p["gravity"] * (1.0 - buoyancy)  # of what is in the hole
-        self.head_gravity = p["gravity"]
-        self.head_mass, self.casing_mass = p["head.mass"], p.get("casing.mass", 0.0)
-        self.sticking = p["friction.force"]  # by length [N/m]
-        self.viscous = p["friction.viscosity"]  # by length [N s/m2]
-        self.head = self.casing = self.head_velocity = self.casing_velocity = 0.0
-        self.friction_loss = self.weight_work = self.lost_momentum = 0.0
-
-    def divide(self, cells: int) -> None:
-        """Divide each rod into so many cells, which waves cross in `step` [s]."""
-        self.cells_of_rod, self.cell = cells, self.length_of_rod / cells
-        self.step = self.cell / self.speed
-        self.cell_mass = self.density * self.area * self.cell
-
-    def apply_friction(self, v: np.ndarray, mass: float, length: float, step: float) -> np.ndarray:
-        """Velocities after a step of wall friction on pieces of a mass and a length.
-
-        Coulomb friction stops a piece at most, viscous friction is implicit:
-        m v' = -s L sign(v) - c L v.
-        """
-        slowing = self.sticking * length / mass * step
-        after = np.sign(v) * np.maximum(np.abs(v) - slowing, 0.0)
-        after /= 1.0 + self.viscous * length / mass * step
-        self.friction_loss += 0.5 * mass * float(v @ v - after @ after)
-        self.lost_momentum += mass * float((v - after).sum())
-        return after
-
-    @property
-    def weight(self) -> float:
-        """Weight of head, rods and casing, less buoyancy [N]."""
-        rods = self.density * self.area * self.length_of_rod * self.count
-        return self.head_gravity * self.head_mass + self.gravity * (rods + self.casing_mass)
+    slowed = max(abs(v) - p.friction_force * length / mass * h, 0.0)
+    after = math.copysign(slowed, v) / (1.0 + p.friction_viscosity * length / mass * h)
+    s.friction_loss += 0.5 * mass * (v * v - after * after)
+    s.lost_momentum += mass * (v - after)
+    return after
 
 
-class TakesRods:
-    """A model of a string whose body gets more rods as it goes down.
+class Lumps(NamedTuple):
+    """A mass for each rod between springs: their mass and stiffness, those at the ends twice as
+    stiff since they are half as long."""
 
-    Attributes
-    ----------
-    added : int
-        Rods since the start.
-    next_rod : float
-        Displacement of the head at which the next one is wanted [m].
-    was_asked : bool
-        Whether one was asked for in the step before.
-    brought_energy, brought_momentum : float
-        Of new rods [J, N s].
+    rod_mass: float
+    stiffness: float
+    velocities: int  # where they begin in what moves; places come first
+
+
+@kernel
+def lumps_of(p):
+    """Masses and springs of rods."""
+    rod_mass = p.rod_density * p.rod_area * p.rod_length
+    return Lumps(rod_mass, p.rod_youngs_modulus * p.rod_area / p.rod_length, p.rod_most + 2)
+
+
+@kernel
+def mass_at(p, s, lumps, k):
+    """Mass of a lump, head first [kg]."""
+    return p.head_mass if k == 0 else p.casing_mass if k == s.count + 1 else lumps.rod_mass
+
+
+@kernel
+def weight_at(p, s, lumps, k):
+    """Weight of a lump [N]."""
+    return (p.gravity if k == 0 else gravity_of(p)) * mass_at(p, s, lumps, k)
+
+
+@kernel
+def spring_below(s, lumps, k):
+    """Stiffness of the spring below a lump [N/m]."""
+    return (2.0 if k == 0 or k == s.count else 1.0) * lumps.stiffness
+
+
+@kernel
+def rest_lumps(p, s, w, bottom_force):
+    """Stand still, with this compression at the casing's upper side [N]."""
+    lumps, x, force = lumps_of(p), w.moving, bottom_force
+    for k in range(s.count, -1, -1):
+        x[k] = x[k + 1] + force / spring_below(s, lumps, k)
+        force -= weight_at(p, s, lumps, k)
+
+
+@kernel
+def force_on(p, s, w, lumps, k, head_force, casing_force):
+    """Force on a lump, of its springs, its weight and from outside [N]."""
+    x, last, force = w.moving, s.count + 1, weight_at(p, s, lumps, k)
+    if k > 0:
+        force += spring_below(s, lumps, k - 1) * (x[k - 1] - x[k])
+    if k < last:
+        force -= spring_below(s, lumps, k) * (x[k] - x[k + 1])
+    return force + (head_force if k == 0 else casing_force if k == last else 0.0)
+
+
+@kernel
+def advance_lumps(p, s, w, head_force, casing_force, h):
+    """Go on by a step `h` [s] under forces on head and casing [N], by the implicit midpoint rule.
+
+    (M + h^2/4 K) v_mean = M v + h/2 (f - K x), whose matrix has three diagonals (Thomas).
     """
-
-    parameters: dict[str, Any]
-    body: Any
-    added: int
-    next_rod: float
-    was_asked: bool
-    brought_energy: float
-    brought_momentum: float
-
-    def rods_fault(self, saved: Mapping[str, Any]) -> str:
-        """What is wrong with the rods of a state from outside; empty if nothing is."""
-        body, count = saved["body"], saved["body"]["count"]
-        if type(count) is not int or not 1 <= count <= MOST_RODS:
-            return f"{count!r} rods, which must be 1 to {MOST_RODS}"
-        for name, length in self.body.lengths(count).items():
-            if len(body[name]) != length:
-                return f"{len(body[name])} numbers in {name}, which must be {length}"
-        return ""
-
-    def _add_rods(self, asked: bool) -> None:
-        """Add a rod on the rising edge of `add_rod`, or by itself where the head is down."""
-        wanted = self.body.head >= self.next_rod
-        if wanted and (self.parameters["rod.automatic"] or (asked and not self.was_asked)):
-            before = self.body.stored, self.body.momentum
-            self.body.add_rod()
-            self.added += 1
-            self.next_rod += self.parameters["rod.length"]
-            self.brought_energy += self.body.stored - before[0]
-            self.brought_momentum += self.body.momentum - before[1]
-        self.was_asked = bool(asked)
+    lumps, last, quarter = lumps_of(p), s.count + 1, 0.25 * h * h
+    x, v0 = w.moving, lumps.velocities
+    above, mean = w.made, lumps.velocities  # shares of the lump below, then mean velocities
+    for k in range(last + 1):
+        mass = mass_at(p, s, lumps, k)
+        upper = quarter * spring_below(s, lumps, k - 1) if k > 0 else 0.0
+        lower = quarter * spring_below(s, lumps, k) if k < last else 0.0
+        right = mass * x[v0 + k]
+        right += 0.5 * h * force_on(p, s, w, lumps, k, head_force, casing_force)
+        diagonal = mass + upper + lower
+        if k > 0:
+            diagonal -= upper * above[k - 1]
+            right += upper * above[mean + k - 1]
+        above[k], above[mean + k] = lower / diagonal, right / diagonal
+    for k in range(last - 1, -1, -1):
+        above[mean + k] += above[k] * above[mean + k + 1]
+    for k in range(last + 1):
+        v = above[mean + k]
+        x[v0 + k] = 2.0 * v - x[v0 + k]
+        x[k] += h * v
+        s.weight_work += h * weight_at(p, s, lumps, k) * v
+        if 0 < k < last:
+            x[v0 + k] = rubbed(p, s, x[v0 + k], lumps.rod_mass, p.rod_length, h)
+    s.head += h * above[mean]
+    s.casing += h * above[mean + last]
+    s.head_velocity, s.casing_velocity = x[v0], x[v0 + last]
 
 
-class Lumps(Rods):
-    """A mass for each rod between springs; the implicit midpoint rule, any step.
+@kernel
+def add_lump(p, s, w):
+    """Put a rod below the head, at rest in the compression of the place."""
+    lumps, x = lumps_of(p), w.moving
+    v0, top = lumps.velocities, 2.0 * lumps.stiffness
+    force, weight = top * (x[0] - x[1]), weight_at(p, s, lumps, 1)
+    s.count += 1
+    for k in range(s.count + 1, 1, -1):
+        x[k], x[v0 + k] = x[k - 1], x[v0 + k - 1]
+    x[1] = x[2] + force / lumps.stiffness
+    x[0] = x[1] + (force - weight) / top
+    x[v0 + 1] = x[v0]
 
-    Without Coulomb friction a step is a matrix, which is kept: one product moves the string.
 
-    Attributes
-    ----------
-    places, velocities : ndarray, shape (rods + 2,)
-        Displacements from the unloaded string [m] and velocities [m/s], head first.
-    """
+@kernel
+def stored_in_lumps(p, s, w):
+    """Kinetic and elastic energy [J]."""
+    lumps, x, total = lumps_of(p), w.moving, 0.0
+    for k in range(s.count + 2):
+        v = x[lumps.velocities + k]
+        total += mass_at(p, s, lumps, k) * (v * v)
+    for k in range(s.count + 1):
+        pressed = x[k] - x[k + 1]
+        total += spring_below(s, lumps, k) * (pressed * pressed)
+    return 0.5 * total
 
-    STATE = (*Rods.STATE, "places", "velocities")
-    step = math.inf  # a communication step is a step
 
-    def __init__(self, parameters: dict[str, Any], count: int) -> None:
-        super().__init__(parameters, count)
-        self.places = np.zeros(count + 2)
-        self.velocities = np.zeros(count + 2)
-        self.assemble()
-
-    def lengths(self, count: int) -> dict[str, int]:
-        """Lengths of the lists in a state of so many rods."""
-        return {"places": count + 2, "velocities": count + 2}
-
-    def assemble(self) -> None:
-        """Masses, weights, and springs: half a rod's length beside an end."""
-        n = self.count
-        rod = self.density * self.area * self.length_of_rod
-        self.masses = np.array([self.head_mass, *[rod] * n, self.casing_mass])
-        self.weights = self.gravity * self.masses
-        self.weights[0] = self.head_gravity * self.head_mass
-        whole = self.modulus * self.area / self.length_of_rod
-        springs = np.array([2.0 * whole, *[whole] * (n - 1), 2.0 * whole])
-        self.springs = springs
-        self.stiffness = np.zeros((n + 2, n + 2))
-        for i, k in enumerate(springs):
-            self.stiffness[i, i] += k
-            self.stiffness[i + 1, i + 1] += k
-            self.stiffness[i, i + 1] -= k
-            self.stiffness[i + 1, i] -= k
-        self._made_for = 0.0  # step of the operators [s]
-        self._ones = np.ones(n)
-        # places, velocities, forces on head and casing, and 1 for the weights; now and next
-        self._buffers = [np.zeros(2 * n + 7), np.zeros(2 * n + 7)]
-        for buffer in self._buffers:
-            buffer[-1] = 1.0
-        now = self._buffers[0]
-        now[: n + 2], now[n + 2 : -3] = self.places, self.velocities
-        self._view(now)
-
-    def _view(self, buffer: np.ndarray) -> None:
-        n = self.count
-        self.places, self.velocities = buffer[: n + 2], buffer[n + 2 : -3]
-
-    def _make(self, h: float) -> None:
-        """Operators of a step `h` [s]."""
-        n, m = self.count + 2, np.diag(self.masses)
-        # (M + h^2/4 K) v_mean = M v + h/2 (f - K x)
-        self._inverse = np.linalg.inv(m + 0.25 * h * h * self.stiffness)
-        half = 0.5 * h * self._inverse
-        mean = np.column_stack([-half @ self.stiffness, self._inverse @ m,
-                                half[:, 0], half[:, -1], half @ self.weights])  # fmt: skip
-        stay = np.eye(2 * n, 2 * n + 3)
-        self._left = 1.0 / (1.0 + self.viscous * self.length_of_rod / self.masses[1] * h)
-        kept = np.array([1.0, *[self._left] * self.count, 1.0])[:, None]
-        self._moves = np.vstack([stay[:n] + h * mean, kept * (2.0 * mean - stay[n:])])
-        self._made_for = h
-
-    def rest(self, bottom_force: float) -> None:
-        """Stand still, with this compression at the casing's upper side [N]."""
-        n = self.count
-        force = bottom_force
-        for i in range(n, -1, -1):
-            self.places[i] = self.places[i + 1] + force / self.springs[i]
-            force -= self.weights[i]
-
-    def advance(self, head_force: float, casing_force: float, h: float) -> None:
-        """Go on by a step `h` [s] under forces on head and casing [N], without weights."""
-        if h != self._made_for:
-            self._make(h)
-        if self.sticking > 0.0:
-            self._advance_with_friction(head_force, casing_force, h)
-            return
-        now, after = self._buffers
-        before, last = self.places, self.count + 1
-        now[-3], now[-2] = head_force, casing_force
-        np.dot(self._moves, now, after[:-3])
-        self._buffers = [after, now]
-        self._view(after)
-        self.head += after.item(0) - now.item(0)
-        self.casing += after.item(last) - now.item(last)
-        self.weight_work += float(self.weights.dot(self.places - before))
-        self.head_velocity, self.casing_velocity = after.item(last + 1), after.item(-4)
-        if self.viscous > 0.0:
-            rods, left, mass = self.velocities[1:-1], self._left, self.masses.item(1)
-            self.friction_loss += 0.5 * mass * (1.0 / left**2 - 1.0) * float(rods.dot(rods))
-            self.lost_momentum += mass * (1.0 / left - 1.0) * float(rods.dot(self._ones))
-
-    def _advance_with_friction(self, head_force: float, casing_force: float, h: float) -> None:
-        """The same with Coulomb friction."""
-        force = self.weights - self.stiffness @ self.places
-        force[0] += head_force
-        force[-1] += casing_force
-        before = self.velocities
-        mean = self._inverse @ (self.masses * before + 0.5 * h * force)
-        self.velocities[:] = 2.0 * mean - before
-        self.weight_work += h * float(self.weights @ mean)
-        self.places += h * mean
-        self.head += h * float(mean[0])
-        self.casing += h * float(mean[-1])
-        rods = self.velocities[1:-1]
-        rods[:] = self.apply_friction(rods.copy(), float(self.masses[1]), self.length_of_rod, h)
-        self.head_velocity = float(self.velocities[0])
-        self.casing_velocity = float(self.velocities[-1])
-
-    def add_rod(self) -> None:
-        """Put a rod below the head, at rest in the compression of the place."""
-        force = self.springs[0] * float(self.places[0] - self.places[1])
-        v = float(self.velocities[0])
-        places, velocities, weight = self.places, self.velocities, float(self.weights[1])
-        self.count += 1
-        rod = float(places[1]) + force / (0.5 * float(self.springs[0]))
-        head = rod + (force - weight) / float(self.springs[0])
-        self.places = np.concatenate([[head, rod], places[1:]])
-        self.velocities = np.concatenate([[v, v], velocities[1:]])
-        self.assemble()
-
-    @property
-    def stored(self) -> float:
-        """Kinetic and elastic energy [J]."""
-        v, x = self.velocities, self.places
-        return 0.5 * float(v @ (self.masses * v) + x @ (self.stiffness @ x))
-
-    @property
-    def momentum(self) -> float:
-        """Of head, rods and casing [N s]."""
-        return float(self.masses @ self.velocities)
+@kernel
+def momentum_of_lumps(p, s, w):
+    """Of head, rods and casing [N s]."""
+    lumps, total = lumps_of(p), 0.0
+    for k in range(s.count + 2):
+        total += mass_at(p, s, lumps, k) * w.moving[lumps.velocities + k]
+    return total

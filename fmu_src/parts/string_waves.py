@@ -1,186 +1,159 @@
-"""Body of a drill string as travelling waves on a characteristic grid."""
+"""Body of a drill string as travelling waves on a characteristic grid.
+
+In a step each wave moves by one cell, exactly. With v = d + u and the compression F = Z (d - u) in
+each cell, d goes down and u up. An end mass is advanced in closed form under the wave that meets
+it: M v' = F + M g - Z (v - 2 u). What moves is d of all cells, the first below the head, and u.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
+from fmu_src.parts.string_body import (
+    cell_mass_of,
+    gravity_of,
+    impedance_of,
+    rubbed,
+    step_of,
+)
+from percussion_model.physics.elementary import exp, expm1
+from percussion_model.physics.kernel import kernel
 
-from fmu_src.parts.string_body import Rods
 
-
-class Waves(Rods):
-    """Waves on a characteristic grid: in a step each moves by one cell, exactly.
-
-    With v = d + u and the compression F = Z (d - u) in each cell, d goes down and u up.
-    An end mass is advanced in closed form under the wave that meets it:
-    M v' = F + M g - Z (v - 2 u).
-
-    The waves lie in a ring, down the cells and up again, so that one shift moves them all.
+class Grid(NamedTuple):
+    """Numbers that follow from parameters.
 
     Attributes
     ----------
-    ring : ndarray, shape (2 cells,)
-        Waves that go down, from the head to the casing, then those that go up, from the
-        casing to the head [m/s].
     step : float
         Transit time of a cell [s].
+    change : float
+        Half of what weight adds to a wave in it [m/s].
+    head_mean, head_keeps, casing_mean, casing_keeps : float
+        Shares of an end's velocity that count in the mean of a step, and at its end.
+    up : int
+        Where waves that go up begin in what moves.
     """
 
-    STATE = (*Rods.STATE, "total", "ring")
+    step: float
+    impedance: float
+    cell_mass: float
+    change: float
+    head_mean: float
+    head_keeps: float
+    casing_mean: float
+    casing_keeps: float
+    up: int
 
-    def __init__(self, parameters: dict[str, Any], count: int) -> None:
-        super().__init__(parameters, count)
-        self.divide(int(parameters["rod.cells"]))
-        self.total = 0.0  # of the waves
-        self.ring = np.zeros(2 * count * self.cells_of_rod)
-        # share of a velocity that viscous friction leaves in a step
-        self._left_by_wall = 1.0 / (1.0 + self.viscous * self.cell / self.cell_mass * self.step)
-        self._ends = self.impedance, self._shares(self.head_mass), self._shares(self.casing_mass)
-        self._change = 0.25 * self.gravity * self.step
-        self._head_weight = self.head_mass * self.head_gravity
-        self._casing_weight = self.casing_mass * self.gravity
 
-    def _shares(self, mass: float) -> tuple[float, float]:
-        """Shares of an end's velocity that count in the mean of a step, and at its end."""
-        x = self.impedance * self.step / mass
-        return -math.expm1(-x) / x, math.exp(-x)
+@kernel
+def grid_of(p):
+    """The grid of a string."""
+    step, impedance = step_of(p), impedance_of(p)
+    x, y = impedance * step / p.head_mass, impedance * step / p.casing_mass
+    return Grid(
+        step, impedance, cell_mass_of(p), 0.25 * gravity_of(p) * step,
+        -expm1(-x) / x, exp(-x), -expm1(-y) / y, exp(-y), p.rod_most * p.rod_cells,
+    )  # fmt: skip
 
-    def lengths(self, count: int) -> dict[str, int]:
-        """Lengths of the lists in a state of so many rods."""
-        return {"ring": 2 * count * self.cells_of_rod}
 
-    @property
-    def ring(self) -> np.ndarray:
-        """All waves."""
-        return self._now[0]
-
-    @ring.setter
-    def ring(self, waves: np.ndarray | Sequence[float]) -> None:
-        waves = np.asarray(waves, float)
-        # two rings, from one to the other at each shift, and back to front
-        self._now, self._next = ((ring, ring[::-1]) for ring in (waves, np.empty_like(waves)))
-        self._room = np.empty_like(waves)
-
-    @property
-    def cells(self) -> int:
-        """Number of cells."""
-        return len(self._now[0]) // 2
-
-    @property
-    def down(self) -> np.ndarray:
-        """Velocity waves that go down; the first cell is below the head [m/s]."""
-        return self.ring[: self.cells]
-
-    @property
-    def up(self) -> np.ndarray:
-        """Those that go up; the first cell is below the head [m/s]."""
-        return self.ring[: self.cells - 1 : -1]
-
-    def rest(self, bottom_force: float) -> None:
-        """Stand still, with this compression at the casing's upper side [N]."""
-        above = np.arange(len(self.down) - 1, -1, -1)
-        force = bottom_force - self.cell_mass * self.gravity * above
-        self.down[:] = force / (2.0 * self.impedance)
+@kernel
+def rest_waves(p, s, w, bottom_force):
+    """Stand still, with this compression at the casing's upper side [N]."""
+    grid, cells, weight = grid_of(p), s.count * p.rod_cells, cell_mass_of(p) * gravity_of(p)
+    for k in range(cells):
+        force = bottom_force - weight * (cells - 1 - k)
         # a cell keeps the force of its middle
-        self.down[:] -= 0.25 * self.gravity * self.step
-        self.up[:] = -self.down
-        self.total = float(self.ring.sum())
+        w.moving[k] = force / (2.0 * grid.impedance) - grid.change
+        w.moving[grid.up + k] = -w.moving[k]
+    s.total = 0.0
 
-    def advance(self, forces: Sequence[tuple[float, float]]) -> None:
-        """Go on by some transit times, at most as many as there are cells.
 
-        The waves that meet an end in that time are on their way there already; so all others
-        move at once, and wall friction takes its share at the end. Coulomb friction, which
-        holds what is about to turn, wants one transit time at a time.
+@kernel
+def advance_waves(p, s, w, grid, head_force, casing_force):
+    """Go on by a transit time under forces on head and casing, without weights [N]."""
+    cells, x, up, change = s.count * p.rod_cells, w.moving, grid.up, grid.change
+    head_weight, casing_weight = p.head_mass * p.gravity, p.casing_mass * gravity_of(p)
+    # half of the weight's effect on a wave comes before it meets an end, half after
+    rising, falling = x[up] + change, x[cells - 1] + change
+    # an end tends to the velocity at which force and wave are in balance
+    settled = (head_force + head_weight) / grid.impedance + 2.0 * rising
+    off = s.head_velocity - settled
+    s.head_velocity, top = settled + off * grid.head_keeps, settled + off * grid.head_mean
+    settled = (casing_force + casing_weight) / grid.impedance + 2.0 * falling
+    off = s.casing_velocity - settled
+    s.casing_velocity = settled + off * grid.casing_keeps
+    bottom = settled + off * grid.casing_mean
+    for k in range(cells - 1, 0, -1):
+        x[k] = x[k - 1] + 2.0 * change
+    for k in range(cells - 1):
+        x[up + k] = x[up + k + 1] + 2.0 * change
+    x[0], x[up + cells - 1] = top - rising + change, bottom - falling + change
+    after = s.total + top + bottom - 2.0 * (falling + rising) + 4.0 * cells * change
+    s.head += top * grid.step
+    s.casing += bottom * grid.step
+    s.weight_work += grid.step * (head_weight * top + casing_weight * bottom)
+    # by twice the sum of the waves in the middle of this time
+    s.weight_work += 2.0 * grid.cell_mass * change * (s.total + after)
+    s.total = after
 
-        Parameters
-        ----------
-        forces : sequence of tuple
-            On head and casing in each transit time, without weights [N].
-        """
-        (now, _), (ring, back) = self._now, self._next
-        count, cells, change = len(forces), len(now) // 2, self._change
-        impedance, (of_head, head_keeps), (of_casing, casing_keeps) = self._ends
-        head, casing = self.head_velocity, self.casing_velocity
-        # what comes first lies last
-        down, up = now[cells - count : cells].tolist(), now[-count:].tolist()
-        tops, bottoms = [0.0] * count, [0.0] * count
-        head_way = casing_way = fallen = 0.0
-        total, added = self.total, 4.0 * cells * change
-        gained = change  # half of the weight's effect on a wave before it meets an end
-        for k in range(count - 1, -1, -1):
-            head_force, casing_force = forces[count - 1 - k]
-            rising, falling = up[k] + gained, down[k] + gained
-            # an end tends to the velocity at which force and wave are in balance
-            settled = (head_force + self._head_weight) / impedance + 2.0 * rising
-            off = head - settled
-            head, top = settled + off * head_keeps, settled + off * of_head
-            settled = (casing_force + self._casing_weight) / impedance + 2.0 * falling
-            off = casing - settled
-            casing, bottom = settled + off * casing_keeps, settled + off * of_casing
-            head_way += top
-            casing_way += bottom
-            # what is left is gained by those that go back, till the waves come to rest
-            left = change * (2 * count) - gained
-            tops[k], bottoms[k] = top - rising + left, bottom - falling + left
-            after = total + top + bottom - 2.0 * (falling + rising) + added
-            fallen += total + after  # twice the sum of the waves in the middle of this time
-            total = after
-            gained += 2.0 * change
-        np.add(now[:-count], 2.0 * change * count, ring[count:])
-        ring[:count], ring[cells : cells + count] = tops, bottoms
-        self._now, self._next = self._next, self._now
-        self.head_velocity, self.casing_velocity, self.total = head, casing, total
-        h = self.step
-        self.head += head_way * h
-        self.casing += casing_way * h
-        self.weight_work += h * (self._head_weight * head_way + self._casing_weight * casing_way)
-        self.weight_work += 2.0 * self.cell_mass * change * fallen
-        if self.sticking > 0.0:
-            self._apply_coulomb_friction(ring, count)
-        elif self.viscous > 0.0:
-            self._apply_viscous_friction(ring, back, count)
 
-    def _apply_coulomb_friction(self, ring: np.ndarray, count: int) -> None:
-        """Coulomb and viscous friction on all cells; both waves of a cell lose the same."""
-        cells = self.cells
-        v = self.down + self.up
-        change = 0.5 * (self.apply_friction(v, self.cell_mass, self.cell, count * self.step) - v)
-        ring[:cells] += change
-        ring[cells:] += change[::-1]
-        self.total = float(ring.sum())
+@kernel
+def rub_waves(p, s, w, grid, count):
+    """Wall friction of so many transit times: both waves of a cell lose the same."""
+    if not (p.friction_force > 0.0 or p.friction_viscosity > 0.0):
+        return
+    cells, x, up, length = s.count * p.rod_cells, w.moving, grid.up, p.rod_length / p.rod_cells
+    if p.friction_force > 0.0:
+        s.total = 0.0
+        for k in range(cells):
+            before = x[k] + x[up + k]
+            after = rubbed(p, s, before, grid.cell_mass, length, count * grid.step)
+            x[k] += 0.5 * (after - before)
+            x[up + k] += 0.5 * (after - before)
+            s.total += after
+        return
+    # viscous friction alone: each velocity loses the same share
+    of_one = 1.0 / (1.0 + p.friction_viscosity * length / grid.cell_mass * grid.step)
+    left, squares = 1.0, 0.0
+    for _ in range(count):
+        left *= of_one
+    for k in range(cells):
+        v = x[k] + x[up + k]
+        squares += v * v
+        x[k] += 0.5 * (left - 1.0) * v
+        x[up + k] += 0.5 * (left - 1.0) * v
+    s.friction_loss += 0.5 * grid.cell_mass * (1.0 - left * left) * squares
+    s.lost_momentum += grid.cell_mass * (1.0 - left) * s.total
+    s.total *= left
 
-    def _apply_viscous_friction(self, ring: np.ndarray, back: np.ndarray, count: int) -> None:
-        """Viscous friction alone: each velocity loses the same share."""
-        v, left = self._room, self._left_by_wall**count
-        np.add(ring, back, v)  # each cell twice
-        self.friction_loss += 0.25 * self.cell_mass * (1.0 - left * left) * float(v.dot(v))
-        self.lost_momentum += self.cell_mass * (1.0 - left) * self.total
-        self.total *= left
-        v *= 0.5 * (left - 1.0)
-        ring += v
 
-    def add_rod(self) -> None:
-        """Put a rod below the head, in the state of the place where it joins."""
-        self.count += 1
-        above = np.arange(self.cells_of_rod, 0, -1)
-        change = 0.5 * self.gravity * self.step * above
-        down, up = self.ring[0] - change, self.ring[-1] + change
-        self.ring = np.concatenate([down, self.ring, up[::-1]])
-        self.total = float(self.ring.sum())
+@kernel
+def add_to_waves(p, s, w):
+    """Put a rod below the head, in the state of the place where it joins."""
+    x, new, up = w.moving, p.rod_cells, grid_of(p).up
+    change = 0.5 * gravity_of(p) * step_of(p)
+    for k in range(s.count * new - 1, -1, -1):
+        x[new + k], x[up + new + k] = x[k], x[up + k]
+    s.count += 1
+    for k in range(new):
+        x[k], x[up + k] = x[new] - change * (new - k), x[up + new] + change * (new - k)
+        s.total += x[k] + x[up + k]
 
-    @property
-    def stored(self) -> float:
-        """Kinetic and elastic energy [J]."""
-        waves = self.cell_mass * float(self.ring @ self.ring)
-        ends = self.head_mass * self.head_velocity**2 + self.casing_mass * self.casing_velocity**2
-        return waves + 0.5 * ends
 
-    @property
-    def momentum(self) -> float:
-        """Of head, rods and casing [N s]."""
-        waves = self.cell_mass * float(self.ring.sum())
-        return waves + self.head_mass * self.head_velocity + self.casing_mass * self.casing_velocity
+@kernel
+def stored_in_waves(p, s, w):
+    """Kinetic and elastic energy [J]."""
+    up, total = p.rod_most * p.rod_cells, 0.0
+    for k in range(s.count * p.rod_cells):
+        total += w.moving[k] * w.moving[k] + w.moving[up + k] * w.moving[up + k]
+    ends = p.head_mass * (s.head_velocity * s.head_velocity)
+    ends += p.casing_mass * (s.casing_velocity * s.casing_velocity)
+    return cell_mass_of(p) * total + 0.5 * ends
+
+
+@kernel
+def momentum_of_waves(p, s):
+    """Of head, rods and casing [N s]."""
+    ends = p.head_mass * s.head_velocity + p.casing_mass * s.casing_velocity
+    return cell_mass_of(p) * s.total + ends

@@ -11,117 +11,86 @@ is below 0 leaves by a vent and its energy is lost; the drive leaks. All pressur
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
 
-from fmu_src.parts.air_line import AirLine
-from fmu_src.parts.part import Model, PartTable, slave_of
+from fmu_src.parts import air_line
+from fmu_src.parts.part import NUMBER, Law, PartTable
+from percussion_model.physics.kernel import kernel
 
+AIR = 1  # choice of the medium
 LONGEST_STEP = 1e-3  # of the integration, short against filling the hose [s]
 
 
-class OilLine:
-    """Source with a hose, and a drive that takes a volume for each blow."""
-
-    STATE: ClassVar[tuple[str, ...]] = (
-        "pressure", "flow", "energy", "relief_volume", "drive_pressure",
-    )  # fmt: skip
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        self.parameters = parameters
-        self.pressure = self.flow = self.energy = self.relief_volume = 0.0
-        self.drive_pressure = 0.0
-        p = parameters
-        self.capacity = p["hose.volume"] / p["hose.bulk_modulus"]
-        self.gain = self.capacity / p["source.time"]
-        self.resistance, self.relief = p["hose.resistance"], p["relief_pressure"]
-        self.flows = -p["vent.flow_limit"], p["source.flow_limit"]
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Start with the hose full."""
-        self.pressure = self.drive_pressure = self.parameters["start.pressure"]
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Integrate the pressure of the hose, implicit in it."""
-        p, capacity, gain, resistance = self.parameters, self.capacity, self.gain, self.resistance
-        wanted = min(inputs["pressure_command"], p["source.pressure_limit"])
-        wanted *= 1.0 - inputs["pressure_loss"]
-        taken = leak = 0.0
-        if inputs["percussion_on"]:
-            taken, leak = p["drive.volume"] * inputs["blow_frequency"], p["drive.leakage"]
-        # the leak of the drive sees what is left behind the hose
-        lost = leak / (1.0 + leak * resistance)
-        count = max(1, math.ceil(step_size / LONGEST_STEP))
-        h = step_size / count
-        for _ in range(count):
-            held = self.pressure - h / capacity * taken
-            new = (held + h / capacity * gain * wanted) / (1.0 + h / capacity * (gain + lost))
-            flow = gain * (wanted - new)
-            if not self.flows[0] <= flow <= self.flows[1]:
-                flow = min(max(flow, self.flows[0]), self.flows[1])
-                new = (held + h / capacity * flow) / (1.0 + h / capacity * lost)
-            new = max(new, 0.0)
-            if new > self.relief:
-                self.relief_volume += capacity * (new - self.relief)
-                new = self.relief
-            self.flow, self.pressure = max(flow, 0.0), new
-            self.energy += h * self.flow * new
-        drawn = taken + leak * self.pressure
-        self.drive_pressure = max(0.0, (self.pressure - resistance * drawn)
-                                  / (1.0 + leak * resistance))  # fmt: skip
-
-    def signals(self) -> dict[str, Any]:
-        """What hammer, rock and controller take."""
-        return {"supply_pressure": self.drive_pressure}
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        return {
-            "supply_pressure": self.drive_pressure,
-            "hose_pressure": self.pressure,
-            "flow": self.flow,
-            "energy": self.energy,
-            "relief_volume": self.relief_volume,
-            "relief_open": self.pressure >= self.parameters["relief_pressure"],
-        }
+@kernel
+def begin(p, u, s, w):
+    """Start with the hose full."""
+    s.pressure = s.drive_pressure = p.start_pressure
+    if p.medium == AIR:
+        air_line.begin(p, u, s)
 
 
-# What there is of air alone.
-WITHOUT_AIR = {"back_pressure": 0.0, "air_given": 0.0, "air_lost": 0.0, "air_stored": 0.0}
+@kernel
+def step(p, u, s, w, h):
+    """Advance by a communication step."""
+    if p.medium == AIR:
+        air_line.step(p, u, s, h)
+    else:
+        flow_of_oil(p, u, s, h)
+    return 0
 
 
-class Supply(Model):
-    """Supply of what its parameters say."""
+@kernel
+def flow_of_oil(p, u, s, step_size):
+    """Integrate the pressure of the hose, implicit in it."""
+    capacity, resistance = p.hose_volume / p.hose_bulk_modulus, p.hose_resistance
+    gain = capacity / p.source_time
+    wanted = min(u.pressure_command, p.source_pressure_limit) * (1.0 - u.pressure_loss)
+    taken = leak = 0.0
+    if u.percussion_on:
+        taken, leak = p.drive_volume * u.blow_frequency, p.drive_leakage
+    # the leak of the drive sees what is left behind the hose
+    lost = leak / (1.0 + leak * resistance)
+    count = max(1, math.ceil(step_size / LONGEST_STEP))
+    h = step_size / count
+    for _ in range(count):
+        held = s.pressure - h / capacity * taken
+        new = (held + h / capacity * gain * wanted) / (1.0 + h / capacity * (gain + lost))
+        flow = gain * (wanted - new)
+        if not -p.vent_flow_limit <= flow <= p.source_flow_limit:
+            flow = min(max(flow, -p.vent_flow_limit), p.source_flow_limit)
+            new = (held + h / capacity * flow) / (1.0 + h / capacity * lost)
+        new = max(new, 0.0)
+        if new > p.relief_pressure:
+            s.relief_volume += capacity * (new - p.relief_pressure)
+            new = p.relief_pressure
+        s.flow, s.pressure = max(flow, 0.0), new
+        s.energy += h * s.flow * new
+    drawn = taken + leak * s.pressure
+    s.drive_pressure = max(0.0, (s.pressure - resistance * drawn) / (1.0 + leak * resistance))
 
-    STATE = ("line",)
 
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        super().__init__(parameters)
-        is_air = parameters["medium"] == "air"
-        self.line: OilLine | AirLine = AirLine(parameters) if is_air else OilLine(parameters)
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """As in `Model`."""
-        self.line.begin(inputs)
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """As in `Model`."""
-        self.line.step(inputs, step_size)
-
-    def signals(self) -> dict[str, Any]:
-        """As in `Model`."""
-        return self.line.signals()
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        return WITHOUT_AIR | self.line.outputs()
+@kernel
+def outputs(p, s, w, y):
+    """Present values."""
+    if p.medium == AIR:
+        air_line.outputs(p, s, y)
+        return
+    y.supply_pressure, y.hose_pressure, y.flow = s.drive_pressure, s.pressure, s.flow
+    y.energy, y.relief_volume = s.energy, s.relief_volume
+    y.relief_open = s.pressure >= p.relief_pressure
+    y.back_pressure = y.air_given = y.air_lost = y.air_stored = 0.0
 
 
-SupplyPart = slave_of(Supply)
+LAW = Law(
+    state=dict.fromkeys(("pressure", "drive_pressure", "flow", "energy", "relief_volume"), NUMBER)
+    | air_line.STATE,
+    begin=begin,
+    step=step,
+    outputs=outputs,
+)
 
 
 TABLE = PartTable(
     name="Supply",
-    slave=SupplyPart,
     description="Supply of air or oil: source, hose volume, pressure drop, relief valve",
     inputs={
         "pressure_command": ("Pa", 0.0, 1e9, 2e6, "pressure that is wanted"),
@@ -171,4 +140,5 @@ TABLE = PartTable(
     },
     at_start={"supply_pressure": (), "hose_pressure": (), "relief_open": (), "air_stored": (),
               "back_pressure": ("bit_position",)},
+    law=LAW,
 )  # fmt: skip

@@ -9,184 +9,243 @@ hammer does (docs/system.md, section 4). Steps may be as long as the rods delay 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
-import numpy as np
+from fmu_src.parts import string_body as body
+from fmu_src.parts import string_packets as packets
+from fmu_src.parts.part import COUNT, NUMBER, Law, PartTable
+from fmu_src.parts.string_packets import COMING, DEGREES
+from percussion_model.physics.elementary import exp
+from percussion_model.physics.kernel import kernel
 
-from fmu_src.parts.part import COUNT, Model, PartTable, slave_of
-from fmu_src.parts.string_body import TakesRods
-from fmu_src.parts.string_packets import DEGREES, Packet, Packets, projected
-
-# A time this close to another, by the step, is that.
-ROUNDING = 1e-9
+# A time this close to another, by the step, is that; a wave that lacks less of its step is whole.
+ROUNDING, WHOLE = 1e-9, 1e-4
+# A wave that has come up: when its step began, and its polynomials.
+PACKET = 1 + DEGREES
+LATEST = 1e9  # of inputs [s]
 _DOWN = tuple(f"wave_{k + 1}" for k in range(DEGREES))
 _UP = tuple(f"returned_{k + 1}" for k in range(DEGREES))
+# Numbers of what is refused, by `LAW.faults`.
+TOO_MANY, NO_ROOM, SAVED_TOO_MANY, TOO_LONG, OTHER_STEP, LACKING, TIMES = range(1, 8)
 
 
-class WaveString(TakesRods, Model):
-    """String whose lower end is a port for waves.
-
-    Attributes
-    ----------
-    time : float
-        Of the last communication point [s].
-    clock : float
-        Up to which the rods have gone, a step or two behind [s].
-    """
-
-    body: Any
-    time: float
-    clock: float
-    known_until: float
-    returned: list[float]
-    begin_of_wave: float
-    wave: list[float]
-    given: float
-    taken: float
-    mean_push: float
-    added: int
-    next_rod: float
-    was_asked: bool
-    brought_energy: float
-    brought_momentum: float
-    head_work: float
-    head_impulse: float
-    STATE = tuple(__annotations__)
-
-    def __init__(self, parameters: dict[str, Any]) -> None:
-        super().__init__(parameters)
-        for name in self.STATE:
-            setattr(self, name, 0.0)
-        self.body = Packets(parameters, int(parameters["start.rods"]))
-        self.was_asked, self.returned, self.wave = False, [], [0.0] * DEGREES
-        self.span = parameters["communication_step"]
-        self._free_of(self.body.cells)  # refuses a step that is too long
-
-    def _free_of(self, cells: int) -> int:
-        """Lowest cells that give what the hammer needs next whatever it does until then."""
-        free = math.ceil(2.0 * self.span / self.body.step - ROUNDING) + 1
-        if free >= cells:
-            longest = 0.5 * self.body.step * (cells - 2)
-            raise ValueError(
-                f"communication_step = {self.span!r} s: must be at most {longest:.4g} s for "
-                f"{self.body.count} rods in {cells} cells"
-            )
-        return free
-
-    def begin(self, inputs: dict[str, Any]) -> None:
-        """Stand still in balance, with `start.force` at the low end."""
-        self.body.rest(self.parameters["start.force"])
-        self.mean_push = self.parameters["start.feed_force"]
-        self.next_rod = self.parameters["start.rod_left"]
-        self._give(0.0)
-
-    def step(self, inputs: dict[str, Any], step_size: float) -> None:
-        """Take what the hammer has sent, move the rods as far as that is known, and give."""
-        h = self.span
-        if abs(step_size - h) > ROUNDING * h:
-            raise ValueError(
-                f"a step of {step_size!r} s: communication_step is {h!r} s: take steps of that, or "
-                f"set communication_step = {step_size!r}"
-            )
-        self._take(inputs)
-        body, free = self.body, self._free_of(self.body.cells)
-        packets, before = self._packets(), body.head
-        while self.clock + body.step <= self.known_until + ROUNDING * h:
-            coming = projected(packets, self.clock, body.step)
-            body.advance(inputs["head_force"], coming.shares, free)
-            self.clock += body.step
-        self._forget()
-        self.head_work += inputs["head_force"] * (body.head - before)
-        self.head_impulse += inputs["head_force"] * h
-        self.time += h
-        self._give(self.time)
-        share = 1.0 - math.exp(-h / self.parameters["feed_filter"])
-        self.mean_push += share * (inputs["push"] - self.mean_push)
-        self._add_rods(inputs["add_rod"])
-
-    def _take(self, inputs: dict[str, Any]) -> None:
-        """Keep a wave that the hammer has sent whole."""
-        begin, h = inputs["returned_begin"], self.span
-        is_whole = inputs["returned_until"] >= begin + h * (1.0 - 1e-4)
-        if is_whole and begin > self.known_until + 0.5 * h:
-            raise ValueError(
-                f"returned_begin = {begin!r} s: the wave from {self.known_until!r} s on is "
-                f"lacking: the hammer must take steps of communication_step, {h!r} s"
-            )
-        if is_whole and begin > self.known_until - 0.5 * h:
-            shares = [float(inputs[name]) for name in _UP]
-            self.returned += [begin, *shares]
-            self.known_until = begin + h
-            self.taken += Packet(begin, h, np.array(shares)).square
-
-    def _packets(self) -> list[Packet]:
-        rows = np.reshape(self.returned, (-1, 1 + DEGREES))
-        return [Packet(row[0], self.span, row[1:]) for row in rows]
-
-    def _forget(self) -> None:
-        """Forget waves that are in the rods."""
-        while self.returned and self.returned[0] + self.span <= self.clock + ROUNDING * self.span:
-            del self.returned[: 1 + DEGREES]
-
-    def _give(self, begin: float) -> None:
-        """Find the wave that leaves over the step to come."""
-        body, ahead = self.body, int((begin - self.clock) / self.body.step)
-        packets = [
-            Packet(self.clock + k * body.step, body.step, body.leaving(k))
-            for k in range(ahead, min(ahead + 2 + math.ceil(self.span / body.step), body.cells))
-        ]
-        found = projected(packets, begin, self.span)
-        self.begin_of_wave, self.wave = begin, found.shares.tolist()
-        self.given += found.square
-
-    def signals(self) -> dict[str, Any]:
-        """What hammer, rig, rock and controller take."""
-        return {
-            "impedance": self.body.impedance,
-            "wave_begin": self.begin_of_wave,
-            "wave_span": self.span,
-            **dict(zip(_DOWN, self.wave, strict=True)),
-            "feed_force_mean": self.mean_push,
-            "head_velocity": self.body.head_velocity,
-        }
-
-    def outputs(self) -> dict[str, Any]:
-        """Present values by name."""
-        body = self.body
-        port = body.impedance * (self.given - self.taken)
-        return self.signals() | {
-            "head_position": body.head,
-            "length": body.count * body.length_of_rod,
-            "weight": body.weight,
-            "rod_wanted": bool(body.head >= self.next_rod),
-            "head_impulse": self.head_impulse,
-            "momentum": body.momentum - self.brought_momentum,
-            "wall_momentum": body.lost_momentum,
-            "energy.head": self.head_work,
-            "energy.weight": body.weight_work,
-            "energy.port": port,
-            "energy.left": body.port_work,
-            "energy.wall": body.friction_loss,
-            "energy.stored": body.stored - self.brought_energy,
-            "rod_count": int(body.count),
-        }
-
-    def state_fault(self, saved: Mapping[str, Any]) -> str:
-        """As in `Model`: the number of rods, and the lengths of what depends on it."""
-        if fault := self.rods_fault(saved):
-            return fault
-        if len(saved["returned"]) % (1 + DEGREES) or len(saved["wave"]) != DEGREES:
-            return "waves of another length"
-        return ""
+@kernel
+def kept_waves(p):
+    """Room for waves that have come up, and are not in the rods yet."""
+    return math.ceil(body.step_of(p) / p.communication_step) + 3
 
 
-WaveStringPart = slave_of(WaveString)
+@kernel
+def down_at(p):
+    """Where waves that go down begin in what moves: behind those that have come up."""
+    return kept_waves(p) * PACKET
 
+
+@kernel
+def up_at(p):
+    """Where waves that go up begin there."""
+    return down_at(p) + p.rod_most * p.rod_cells * DEGREES
+
+
+@kernel
+def moving(p):
+    """Numbers that belong to the state."""
+    return up_at(p) + p.rod_most * p.rod_cells * DEGREES
+
+
+@kernel
+def made(p):
+    """Numbers that follow from parameters."""
+    return packets.MADE
+
+
+@kernel
+def free_cells(p):
+    """Lowest cells that give what the hammer needs next whatever it does until then."""
+    return math.ceil(2.0 * p.communication_step / body.step_of(p) - ROUNDING) + 1
+
+
+@kernel
+def check(p, facts):
+    """Refuse more rods than there may be, and a step in which a wave goes through all of them."""
+    if body.rods_fault(p.start_rods, p.rod_most, facts):
+        return TOO_MANY
+    cells = p.start_rods * p.rod_cells
+    facts[0], facts[1] = p.communication_step, 0.5 * body.step_of(p) * (cells - 2)
+    facts[2], facts[3] = p.start_rods, cells
+    return TOO_LONG if free_cells(p) >= cells else 0
+
+
+@kernel
+def begin(p, u, s, w):
+    """Stand still in balance, with `start.force` at the low end."""
+    s.count, s.next_rod, s.mean_push = p.start_rods, p.start_rod_left, p.start_feed_force
+    packets.rest_packets(p, s, w, down_at(p), up_at(p), p.start_force)
+    give(p, s, w)
+
+
+@kernel
+def step(p, u, s, w, h):
+    """Take what the hammer has sent, move the rods as far as that is known, and give."""
+    span, cell = p.communication_step, body.step_of(p)
+    if abs(h - span) > ROUNDING * span:
+        w.facts[0], w.facts[1] = h, span
+        return OTHER_STEP
+    fault = take(p, u, s, w)
+    if fault > 0:
+        return fault
+    down, up, head, free = down_at(p), up_at(p), s.head, free_cells(p)
+    while s.clock + cell <= s.known_until + ROUNDING * span:
+        packets.clear(w.made, COMING)
+        for k in range(s.returned):
+            at = k * PACKET
+            packets.project(w.moving, at + 1, w.moving[at], span, w.made, COMING, s.clock, cell)
+        packets.advance_packets(p, s, w, down, up, u.head_force, free)
+        s.clock += cell
+    forget(p, s, w)
+    s.head_work += u.head_force * (s.head - head)
+    s.head_impulse += u.head_force * span
+    s.time += span
+    give(p, s, w)
+    s.mean_push += (1.0 - exp(-span / p.feed_filter)) * (u.push - s.mean_push)
+    return add_rod(p, s, w) if body.is_wanted(p, u, s) else 0
+
+
+@kernel
+def take(p, u, s, w):
+    """Keep a wave that the hammer has sent whole."""
+    start, span = u.returned_begin, p.communication_step
+    if u.returned_until < start + span * (1.0 - WHOLE):
+        return 0
+    if start > s.known_until + 0.5 * span:
+        w.facts[0], w.facts[1], w.facts[2] = start, s.known_until, span
+        return LACKING
+    if start <= s.known_until - 0.5 * span:
+        return 0
+    if s.returned == kept_waves(p):  # only in a state from outside
+        drop(s, w)
+    at, x = s.returned * PACKET, w.moving
+    x[at] = start
+    x[at + 1], x[at + 2], x[at + 3] = u.returned_1, u.returned_2, u.returned_3
+    x[at + 4], x[at + 5], x[at + 6] = u.returned_4, u.returned_5, u.returned_6
+    x[at + 7], x[at + 8] = u.returned_7, u.returned_8
+    s.returned += 1
+    s.known_until = start + span
+    s.taken += span * packets.square(x, at + 1)
+    return 0
+
+
+@kernel
+def drop(s, w):
+    """Forget the first of the waves that have come up."""
+    s.returned -= 1
+    for k in range(s.returned * PACKET):
+        w.moving[k] = w.moving[PACKET + k]
+
+
+@kernel
+def forget(p, s, w):
+    """Forget waves that are in the rods."""
+    span = p.communication_step
+    while s.returned > 0 and w.moving[0] + span <= s.clock + ROUNDING * span:
+        drop(s, w)
+
+
+@kernel
+def give(p, s, w):
+    """Find the wave that leaves over the step to come."""
+    span, cell, cells = p.communication_step, body.step_of(p), s.count * p.rod_cells
+    ahead = max(math.floor((s.time - s.clock) / cell), 0)
+    packets.clear(s.wave, 0)
+    for k in range(ahead, min(ahead + 2 + math.ceil(span / cell), cells)):
+        packets.leave(p, s, w, down_at(p), k, COMING)
+        packets.project(w.made, COMING, s.clock + k * cell, cell, s.wave, 0, s.time, span)
+    s.wave_begin = s.time
+    s.given += span * packets.square(s.wave, 0)
+
+
+@kernel
+def add_rod(p, s, w):
+    """Add a rod, and book what it brings."""
+    if body.rods_fault(s.count + 1, p.rod_most, w.facts):
+        w.facts[0] = s.count
+        return NO_ROOM
+    down, up = down_at(p), up_at(p)
+    stored = packets.stored_in_packets(p, s, w, down, up)
+    momentum = packets.momentum_of_packets(p, s, w, down, up)
+    packets.add_to_packets(p, s, w, down, up)
+    s.next_rod += p.rod_length
+    s.brought_energy += packets.stored_in_packets(p, s, w, down, up) - stored
+    s.brought_momentum += packets.momentum_of_packets(p, s, w, down, up) - momentum
+    return 0
+
+
+@kernel
+def outputs(p, s, w, y):
+    """Present values."""
+    down, up, impedance = down_at(p), up_at(p), body.impedance_of(p)
+    y.impedance, y.wave_begin, y.wave_span = impedance, s.wave_begin, p.communication_step
+    y.wave_1, y.wave_2, y.wave_3, y.wave_4 = s.wave[0], s.wave[1], s.wave[2], s.wave[3]
+    y.wave_5, y.wave_6, y.wave_7, y.wave_8 = s.wave[4], s.wave[5], s.wave[6], s.wave[7]
+    y.feed_force_mean, y.head_position, y.head_velocity = s.mean_push, s.head, s.head_velocity
+    y.length, y.weight = s.count * p.rod_length, body.weight_of(p, s.count, 0.0)
+    y.rod_wanted, y.rod_count = s.head >= s.next_rod, s.count
+    y.head_impulse = s.head_impulse
+    y.momentum = packets.momentum_of_packets(p, s, w, down, up) - s.brought_momentum
+    y.wall_momentum, y.energy_head, y.energy_weight = s.lost_momentum, s.head_work, s.weight_work
+    y.energy_port, y.energy_left = impedance * (s.given - s.taken), s.port_work
+    y.energy_wall = s.friction_loss
+    y.energy_stored = packets.stored_in_packets(p, s, w, down, up) - s.brought_energy
+
+
+@kernel
+def state_fault(p, s, w):
+    """Refuse more rods, or more waves, than there is room for, and a clock that is far off."""
+    if body.rods_fault(s.count, p.rod_most, w.facts):
+        return SAVED_TOO_MANY
+    span, cell, facts = p.communication_step, body.step_of(p), w.facts
+    facts[0], facts[1], facts[2], facts[3] = s.returned, s.clock, s.known_until, s.time
+    late = s.known_until - s.clock
+    good = s.returned <= kept_waves(p) and -span <= late <= cell + span and s.clock <= s.time + span
+    return 0 if good and free_cells(p) < s.count * p.rod_cells else TIMES
+
+
+# Time of the last communication point, up to which the rods have gone, a step or two behind, and up
+# to which waves have come up; how many of those are kept; the wave that is given; energies of waves
+# given and taken, divided by impedance.
+LAW = Law(
+    state={
+        **body.STATE,
+        **dict.fromkeys(("time", "clock", "known_until", "wave_begin"), (0.0, LATEST)),
+        "returned": (0, 2**31 - 1),
+        "wave": (*NUMBER, DEGREES),
+        **dict.fromkeys(
+            ("given", "taken", "mean_push", "head_work", "head_impulse", "port_work"), NUMBER
+        ),
+    },
+    begin=begin,
+    step=step,
+    outputs=outputs,
+    made=made,
+    moving=moving,
+    make=packets.make_packets,
+    check=check,
+    state_fault=state_fault,
+    faults=(
+        body.TOO_MANY,
+        body.NO_ROOM,
+        body.SAVED_TOO_MANY,
+        "communication_step = {0:r} s: must be at most {1:.4g} s for {2:d} rods in {3:d} cells",
+        "a step of {0:r} s: communication_step is {1:r} s: take steps of that, or set "
+        "communication_step = {0:r}",
+        "returned_begin = {0:r} s: the wave from {1:r} s on is lacking: the hammer must take steps "
+        "of communication_step, {2:r} s",
+        "the saved state has {0:d} waves that have come up, its rods at {1:r} s, waves up to "
+        "{2:r} s and a present of {3:r} s, which do not fit",
+    ),
+)
 
 TABLE = PartTable(
     name="WaveString",
-    slave=WaveStringPart,
     description="Axial drill string with head, coupled to a casing in the hammer by waves",
     inputs={
         "head_force": ("N", -1e9, 1e9, 0.0, "force of the rig on the head"),
@@ -226,22 +285,9 @@ TABLE = PartTable(
     },
     parameters={
         "communication_step": ("s", 1e-6, 1.0, 1e-3, "step of the master"),
-        "rod.length": ("m", 0.1, 100.0, 3.0, "length of a rod"),
-        "rod.area": ("m^2", 1e-5, 1.0, 2.4e-3, "cross-section of steel"),
-        "rod.density": ("kg/m^3", 100.0, 3e4, 7850.0, "density"),
-        "rod.youngs_modulus": ("Pa", 1e9, 1e12, 2.1e11, "Young's modulus"),
-        "rod.cells": (COUNT, 1, 200, 4, "cells of the wave grid in a rod"),
-        "rod.automatic": ("", 0, 1, True, "whether a rod is added as soon as one is wanted"),
-        "start.rods": (COUNT, 1, 1000, 4, "rods at the start"),
-        "start.rod_left": ("m", 0.0, 100.0, 3.0, "way of the head to the first new rod"),
+        **body.rod_parameters(cells=4),
         "start.feed_force": ("N", 0.0, 1e6, 2500.0, "push of the shoulder at the start"),
         "start.force": ("N", -1e6, 1e6, 2100.0, "force of the rods on the casing at the start"),
-        "head.mass": ("kg", 1.0, 1e5, 300.0, "rotation head with carriage"),
-        "friction.force": ("N/m", 0.0, 1e5, 0.0, "Coulomb friction at the wall by length"),
-        "friction.viscosity": ("N s/m^2", 0.0, 1e5, 20.0, "viscous friction by length"),
-        "fluid_density": ("kg/m^3", 0.0, 3e3, 0.0, "density of the fluid in the hole (buoyancy)"),
-        "gravity": ("m/s^2", -100.0, 100.0, 10.0, "acceleration, down positive"),
-        "feed_filter": ("s", 1e-4, 100.0, 0.1, "time of the filter of feed_force_mean"),
     },
     at_start=dict.fromkeys(
         (
@@ -250,4 +296,5 @@ TABLE = PartTable(
         ),
         (),
     ),
+    law=LAW,
 )  # fmt: skip

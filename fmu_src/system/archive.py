@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
@@ -14,7 +15,10 @@ from fmpy import read_model_description
 from fmu_src.archive import write_archive
 from fmu_src.flat_names import flat_name, wide_name
 from fmu_src.hammer.build import build_hammer, hammer_name, refuse_other
+from fmu_src.native.build import build_native, native_files
+from fmu_src.native.library import libraries
 from fmu_src.parts.build import PARTS, build_part
+from fmu_src.slave.native import this_platform
 from fmu_src.units import UNITS, fmi_unit
 from percussion_model.coupling.component import CouplingError, number_of_word
 from percussion_model.coupling.ssp import FMU
@@ -24,6 +28,7 @@ from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import said_among, shortened, show_value, unprintable
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.text import read_toml
+from percussion_model.solvers.base import added_solvers
 
 SYSTEMS = scenario_folder() / "systems"
 HAMMER, CONTROLLER = "PercussiveHammer", "DrillController"
@@ -178,9 +183,15 @@ def _variables(fmu: Path) -> dict[str, Any]:
 
 
 def build_fmus(
-    plan: SystemPlan, folder: Path, force: bool = False, flat: bool = False
+    plan: SystemPlan,
+    folder: Path,
+    force: bool = False,
+    flat: bool = False,
+    platforms: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, Path]:
     """Write the FMUs of a system into a folder; return their paths by component.
+
+    They need no Python, but for a hammer with a solver that was added.
 
     Parameters
     ----------
@@ -188,23 +199,43 @@ def build_fmus(
         Replace the FMU of another hammer.
     flat : bool
         Whether names of variables have no dots; names of the files say so.
+    platforms : dict of str, optional
+        As `native.library.platform_names` gives them; this one if left out.
+
+    Raises
+    ------
+    NoCompilerError
+        If a library has to be made, and cannot be.
     """
     found = {}
     ending = f"{FLAT if flat else ''}.fmu"
     for component, name in plan.components.items():
         path = folder / f"{name}{ending}"
         if name in PARTS:
-            build_part(PARTS[name], path, flat)
+            build_part(PARTS[name], path, flat, platforms=platforms)
         elif name == HAMMER:
-            path = folder / f"{hammer_name(plan.hammer).removesuffix('.fmu')}{ending}"
-            scene = Scene.from_toml(plan.hammer)
-            refuse_other(path, scene, force)  # one of another scene has another name
-            build_hammer(scene, path, flat=flat)
+            path = _build_hammer(plan.hammer, folder, force, flat, platforms)
         else:
             known = ", ".join([HAMMER, *PARTS])
             raise SystemPlanError(f"{component} = {name!r}: must be one of {known}")
         found[component] = path
     return found
+
+
+def _build_hammer(
+    file: Path, folder: Path, force: bool, flat: bool, platforms: Mapping[str, str]
+) -> Path:
+    """Write the FMU of a scene; return its path, which says whether it is native."""
+    scene, is_native = Scene.from_toml(file), not added_solvers()
+    path = native_files(file, folder)["2.0"] if is_native else folder / hammer_name(file)
+    stem, dash, rest = path.name.removesuffix(".fmu").partition("-")
+    path = path.with_name(f"{stem}{FLAT if flat else ''}{dash}{rest}.fmu")
+    refuse_other(path, scene, force)  # one of another scene has another name
+    if is_native:
+        build_native(scene, path, "2.0", libraries(platforms or [this_platform()]), flat)
+    else:
+        build_hammer(scene, path, flat=flat)
+    return path
 
 
 def write_system(plan: SystemPlan, fmus: dict[str, Path], path: Path) -> Path:

@@ -27,6 +27,7 @@ from fmpy.fmi2 import (
 )
 from lxml import etree
 
+from percussion_model.coupling.calls import LARGEST, WARNING
 from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import nearest, shortened, unit_suffix
 
@@ -42,10 +43,6 @@ _IN_C: dict[str, tuple[Any, str]] = {
 KINDS = {"Float64": "Real", "Float32": "Real"} | {
     f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)
 }
-# Integers of FMI are below this, by size.
-LARGEST = 2.0**31
-# The highest status of a call that did what it should.
-WARNING = 1
 # What FMUs of this project say before they compile; others log what they like.
 COMPILING = "compiling the solver"
 _STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}

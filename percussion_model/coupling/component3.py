@@ -10,7 +10,8 @@ from typing import Any
 from fmpy import platform_tuple
 from fmpy.fmi3 import FMU3Slave
 
-from percussion_model.coupling.component import WARNING, Component, CouplingError
+from percussion_model.coupling.calls import WARNING
+from percussion_model.coupling.component import Component, CouplingError
 
 _IN_C: dict[str, tuple[Any, str]] = {
     "Float64": (ctypes.c_double, "d"), "Float32": (ctypes.c_float, "f"),

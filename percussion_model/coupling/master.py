@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from percussion_model.coupling.compiled import CompiledStep, can_compile
+from percussion_model.coupling.compiled import CompiledSteps, can_compile
 from percussion_model.coupling.component import Component, CouplingError, naming, read_description
 from percussion_model.coupling.component3 import Component3
 from percussion_model.coupling.coupled_run import JUDGED, CoupledRun, known_signals
@@ -45,6 +45,8 @@ INITIAL_PASSES = 4
 # New objects that may be there before garbage is looked for.
 YOUNG = 50_000
 DESCRIPTION = "modelDescription.xml"
+# Steps that compiled code does before it is looked whether the run is to end.
+AT_ONCE = 200
 # A number of steps is whole if it misses by no more than this.
 ROUNDING = 1e-9
 
@@ -98,7 +100,7 @@ class Coupling:
     ) -> None:
         self.path = Path(path)
         self.order, self.on_way, self.compiled = order, on_way, compiled
-        self._compiled_step: CompiledStep | None = None
+        self._compiled: CompiledSteps | None = None
         self._folder = new_folder()
         self.parts: dict[str, Any] = {}
         try:
@@ -238,18 +240,20 @@ class Coupling:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
         start = self.start
         rows, jumps = [[start, *self._row()]], Jumps(self.ports, self.every)
-        go, error, done, interrupted = self._stepping(count, control), "", 0, False
+        go, error, done, interrupted = self._stepping(count, step, control), "", 0, False
         began, used = clock.perf_counter(), clock.process_time()
         with stop_on_interrupt(keep=True) as stop:
-            for k in range(count):
-                has_row = (k + 1) % every == 0 or k + 1 == count
+            while done < count:
+                due = min((done // every + 1) * every, count)
+                has_row = done + 1 == due
                 before = self._present() if has_row else None
                 try:
-                    go(start + k * step, step)
+                    # the last step before a row alone: it tells by how much signals change
+                    done = go(done, due if has_row else due - 1)
                 except CouplingError as failure:
-                    error = f"at {start + k * step:.6g} s: {failure}"
+                    done = done if self._compiled is None else self._compiled.done
+                    error = f"at {start + done * step:.6g} s: {failure}"
                     break
-                done = k + 1
                 interrupted = stop()
                 if has_row or interrupted:
                     rows.append([start + done * step, *self._row()])
@@ -268,17 +272,34 @@ class Coupling:
             run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
         return run
 
-    def _stepping(self, count: int, control: StepControl | None) -> Callable[[float, float], None]:
-        """Return what does a step: compiled code where that is possible, else Python."""
-        if control is not None:
-            return control.stepping(self.step)
-        if self.compiled and can_compile(self.ports):
-            self._compiled_step = CompiledStep(self.ports, self.order, count, self.every)
-            return self._compiled_step
+    def _stepping(
+        self, count: int, step: float, control: StepControl | None
+    ) -> Callable[[int, int], int]:
+        """Return what does steps from one number on, up to another or not as far.
+
+        It gives the number that it has come to. Compiled code does them where that is possible,
+        else Python.
+        """
+        start = self.start
+        if control is None and self.compiled and can_compile(self.ports):
+            self._compiled = CompiledSteps(self.ports, self.order, start, step, count, self.every)
+            compiled = self._compiled
+
+            def go(done: int, until: int) -> int:
+                compiled.go(min(until, done + AT_ONCE))
+                return compiled.done
+
+            return go
         for port in self.ports:
-            if isinstance(port, PacedPort):
+            if isinstance(port, PacedPort) and control is None:
                 port.start(self.every[port.name], count)
-        return self.step
+        one = self.step if control is None else control.stepping(self.step)
+
+        def go_on(done: int, until: int) -> int:
+            one(start + done * step, step)
+            return done + 1
+
+        return go_on
 
     def _connect(self, signals: list[str]) -> None:
         """Make the ports; everything that is kept is read."""
@@ -348,8 +369,8 @@ class Coupling:
 
     def _present(self) -> list[Any]:
         """Present values of all outputs that parts take."""
-        if self._compiled_step is not None:
-            self._compiled_step.publish()
+        if self._compiled is not None:
+            self._compiled.publish()
         return list(self.ports[0].values)
 
     def _row(self) -> list[Any]:

@@ -52,3 +52,9 @@ ENTRIES = {
     # base, moving, bar, masses, matrices, modes, cells, forces, velocities -> 0
     "fields": "w:wwwwwwwww",
 }
+# The same of libraries beside those of the solvers.
+OTHERS = {
+    # calls, places, values, reals, integers, at (addresses: `coupling.calls`), steps, start and
+    # step -> steps that are done
+    "calls": {"run": "w:wwwwwwwnn"},
+}

@@ -61,10 +61,10 @@ def faults(bars: Sequence[str] = ("piston", "bit")) -> tuple[str, ...]:
         Fault.NEXT_EVENT: (
             "the saved state has its next event at {0:r} s, at a present of {1:r} s"
         ),
-        Fault.MODAL_FIELD: _of_field(MODAL_LIMITS.names),
-        Fault.WAVE_FIELD: _of_field(WAVE_LIMITS.names),
-        Fault.FEM_FIELD: _of_field(FEM_LIMITS.names),
-        Fault.RIGID_FIELD: _of_field(RIGID_LIMITS.names),
+        Fault.MODAL_FIELD: of_field(MODAL_LIMITS.names),
+        Fault.WAVE_FIELD: of_field(WAVE_LIMITS.names),
+        Fault.FEM_FIELD: of_field(FEM_LIMITS.names),
+        Fault.RIGID_FIELD: of_field(RIGID_LIMITS.names),
     }
     rules = (_of_rule(TEXTS[rule]) for rule in sorted(TEXTS))
     more = [*(_of_state(text) for text in MODAL_FAULTS[1:]), *rules]
@@ -95,7 +95,7 @@ def _of_rule(text: str) -> str:
     return _PLACE.sub(place, text)
 
 
-def _of_field(names: list[str]) -> str:
+def of_field(names: list[str]) -> str:
     """Template of a field that is out of its limits, by its word."""
     choice = f"{{0:|{'|'.join(names)}|}}"
     return f"the saved state has {choice} = {{1:r}}, which must be from {{2:g}} to {{3:g}}"

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from percussion_model.engine import compiler
-from percussion_model.engine.entries import ENTRIES, SOLVERS
+from percussion_model.engine.entries import ENTRIES, OTHERS, SOLVERS
 from percussion_model.engine.platforms import PLATFORMS, this_platform
 from percussion_model.physics.kernel import DISABLED
 
@@ -25,21 +25,28 @@ from percussion_model.physics.kernel import DISABLED
 BROUGHT = compiler.HERE / "libraries"
 # Folders of sources that libraries follow from.
 FOLDERS = ("components", "engine", "physics", "scene", "solvers")
+# Modules of the package with the entries of libraries beside those of the solvers.
+MODULES = {"calls": "coupling.call_kernels"}
 _KINDS: dict[str, Any] = {"w": ctypes.c_int64, "n": ctypes.c_double}
 
 
 def module_of(solver: str) -> str:
-    """Name of the module with the entries of a solver."""
-    return f"{compiler.NAME}.engine.{solver}"
+    """Name of the module with the entries of a solver, or of one of `OTHERS`."""
+    return f"{compiler.NAME}.{MODULES.get(solver, f'engine.{solver}')}"
+
+
+def _forms(solver: str) -> dict[str, str]:
+    """Results and arguments of entries by their names."""
+    return OTHERS.get(solver, ENTRIES)
 
 
 @functools.cache
 def stamp() -> str:
-    """Hash of the sources of all solvers."""
-    files = (file for name in FOLDERS for file in (compiler.PACKAGE / name).rglob("*.py"))
-    return compiler.hash_of(
-        [*sorted(files), *(compiler.HERE / name for name in ("memory.c", "processor.h"))]
-    )
+    """Hash of the sources of all libraries."""
+    files = [file for name in FOLDERS for file in (compiler.PACKAGE / name).rglob("*.py")]
+    files += (compiler.PACKAGE / "coupling").glob("call*.py")
+    of_c = (compiler.HERE / name for name in ("memory.c", "processor.h"))
+    return compiler.hash_of([*sorted(files), *of_c])
 
 
 def brought_file(solver: str, platform: str) -> Path:
@@ -69,6 +76,8 @@ def place_to_compile(solver: str) -> Path | None:
 @functools.cache
 def entries_of(solver: str) -> Any:
     """Entries of a solver by their names, with `free`, which takes what `create` gives.
+
+    Those of one of `OTHERS` too.
 
     Raises
     ------
@@ -129,7 +138,7 @@ def link_solver(solver: str, platform: str, command: Sequence[str], file: Path) 
 def _exports(solver: str, parts: Sequence[Path]) -> str:
     """C that has a linker for Windows export the entries of objects."""
     suffixes = [one.stem.rpartition("_")[2] for one in parts]
-    names = [f"{solver}_{name}_{suffix}" for name in ENTRIES for suffix in suffixes]
+    names = [f"{solver}_{name}_{suffix}" for name in _forms(solver) for suffix in suffixes]
     words = "".join(f" -export:{name}" for name in names)
     return f'__asm__(".section .drectve, \\"yn\\"\\n.ascii \\"{words}\\"\\n.text");\n'
 
@@ -141,7 +150,7 @@ QUICK = {"state_time", "grid_point_after", "readable_until", "is_quiet", "time_o
 def _functions(solver: str, suffix: str, address_of: Callable[[str], int]) -> SimpleNamespace:
     """Entries at addresses."""
     found = SimpleNamespace()
-    for name, form in ENTRIES.items():
+    for name, form in _forms(solver).items():
         result, _, arguments = form.partition(":")
         prototype = ctypes.PYFUNCTYPE if name in QUICK else ctypes.CFUNCTYPE
         kind = prototype(_KINDS[result], *(_KINDS[one] for one in arguments))
@@ -179,6 +188,6 @@ def _plain(solver: str) -> SimpleNamespace:
     from percussion_model.engine import plain_memory
 
     module = import_module(module_of(solver))
-    found = SimpleNamespace(**{name: getattr(module, name) for name in ENTRIES})
+    found = SimpleNamespace(**{name: getattr(module, name) for name in _forms(solver)})
     found.free = plain_memory.free
     return found

@@ -15,14 +15,15 @@ RIGID = {"piston.model": "rigid", "bit.model": "rigid"}
 @pytest.fixture(scope="session")
 def fmus(built_library, tmp_path_factory):
     """Folder with the reference's FMU, that of rigid bodies, both also without a library, and
-    the supply's.
+    those of a part with and without Python.
     """
     folder = tmp_path_factory.mktemp("fmus")
     build_hammer(Scene(), folder / "PercussiveHammer.fmu")
     build_hammer(Scene().replace(**RIGID), folder / "RigidHammer.fmu")
     build_hammer(Scene(), folder / "NumbaHammer.fmu", libraries={})
     build_hammer(Scene().replace(**RIGID), folder / "NumbaRigidHammer.fmu", libraries={})
-    build_part(PARTS["Supply"], folder / "Supply.fmu")
+    for name in ("RockFilter", "Supply"):
+        build_part(PARTS[name], folder / f"{name}.fmu")
     return folder
 
 

@@ -10,6 +10,7 @@ it could harm, and may be nonsense where not.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import math
 import multiprocessing
@@ -28,7 +29,7 @@ from fmpy.fmi1 import FMICallException
 
 from fmu_src.hammer.build import build_hammer
 from fmu_src.parts.build import PARTS, build_part
-from fmu_src.slave.states import HEADER, PLACE, START, pack
+from fmu_src.slave.states import HEADER, PLACE, START
 from percussion_model import Scene
 from scenarios.harness import Instance
 
@@ -82,6 +83,13 @@ def build(names: Sequence[str], folder: Path) -> dict[str, str]:
             extract(str(path), str(folder / base))
         found[name] = str(folder / base)
     return found
+
+
+def packed(state: bytes, body: bytes) -> bytes:
+    """Another body behind the head of a state, which fits it."""
+    magic, version, owner, _ = HEADER.unpack_from(state)
+    head = HEADER.pack(magic, version, owner, len(body))
+    return head + hashlib.sha256(head + body).digest() + body
 
 
 class Damager:
@@ -145,7 +153,7 @@ class Damager:
             body = body[: self.rng.randrange(len(body))]
         else:
             body += self.rng.randbytes(self.rng.choice((1, 8, 64)))
-        return pack(HEADER.unpack_from(state)[2], body)
+        return packed(state, body)
 
     def _remade(self, state: bytearray, count: int) -> bytes:
         body = bytearray(state[START:])
@@ -162,7 +170,7 @@ class Damager:
                 # where most of the state of a hammer has its whole numbers
                 record = self.rng.random() < 0.5
                 self._change(body, 0, 2000 if record else len(body))
-        return pack(HEADER.unpack_from(state)[2], bytes(body))
+        return packed(state, bytes(body))
 
     def _change(self, body: bytearray, first: int, end: int) -> None:
         at = 8 * self.rng.randrange(first, max(first + 1, min(end, len(body)) // 8))

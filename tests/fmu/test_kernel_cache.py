@@ -20,7 +20,7 @@ from scenarios.harness import Instance
 instance = Instance(sys.argv[1]).start()
 instance.step(1e-3)
 for name, module in sys.modules.items():
-    if name.endswith("fmu_src.parts.supply"):
+    if name.endswith("fmu_src.parts.rock_filter"):
         print("code:", module.__file__)
 print("log:", *instance.messages)
 instance.free()
@@ -49,7 +49,7 @@ def look(fmu, cache, **environment):
 
 @pytest.fixture
 def fmu(fmus):
-    return fmus / "Supply.fmu"
+    return fmus / "RockFilter.fmu"
 
 
 @pytest.fixture
@@ -66,8 +66,8 @@ def filled(fmu, tmp_path):
 def plant(code):
     """Change a module, its size being as before."""
     text = code.read_text()
-    line = next(one for one in text.splitlines() if one.startswith("LONGEST_STEP = 1e-3"))
-    planted = text.replace(line, f'LONGEST_STEP = print("{PLANTED}") or 1e-3'.ljust(len(line)))
+    lines = "# Standard deviations of an interval of 95 %.\nSURE = 1.96"
+    planted = text.replace(lines, f'SURE = print("{PLANTED}") or 1.96'.ljust(len(lines)))
     code.write_text(planted)
     assert PLANTED in planted
     assert len(planted) == len(text)

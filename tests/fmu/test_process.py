@@ -63,11 +63,20 @@ def host(fmu, cwd, output="blow_position", absent=ABSENT, **environment):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["PercussiveHammer", "RigidHammer"])
-def test_with_a_library_neither_numpy_nor_numba_nor_a_cache_is_needed(fmus, tmp_path, make, name):
+@pytest.mark.parametrize(
+    ("name", "output"),
+    [
+        ("PercussiveHammer", "blow_position"),
+        ("RigidHammer", "blow_position"),
+        ("Supply", "supply_pressure"),
+    ],
+)
+def test_with_a_library_neither_numpy_nor_numba_nor_a_cache_is_needed(
+    fmus, tmp_path, make, name, output
+):
     cache = tmp_path / "cache"
     done = host(
-        fmus / f"{name}.fmu", tmp_path, absent=f"{ABSENT},numpy,numba,llvmlite",
+        fmus / f"{name}.fmu", tmp_path, output, absent=f"{ABSENT},numpy,numba,llvmlite",
         PERCUSSION_FMU_CACHE=str(cache),
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
@@ -75,7 +84,7 @@ def test_with_a_library_neither_numpy_nor_numba_nor_a_cache_is_needed(fmus, tmp_
     instance = make(name)
     for _ in range(20):
         instance.step(0.01)
-    assert float(done.stderr) == instance.get("blow_position")
+    assert float(done.stderr) == instance.get(output)
 
 
 def test_without_a_library_and_without_numba_the_reason_is_told(fmus, tmp_path):
@@ -148,17 +157,17 @@ def test_without_a_cache_folder_it_runs_from_a_temporary_one(fmus, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     cache = str(blocked / "in it")
-    fmu = fmus / "Supply.fmu"
-    done = host(fmu, tmp_path, "supply_pressure", PERCUSSION_FMU_CACHE=cache, TMPDIR=str(tmp_path))
+    fmu = fmus / "RockFilter.fmu"
+    done = host(fmu, tmp_path, "apparent_energy", PERCUSSION_FMU_CACHE=cache, TMPDIR=str(tmp_path))
     assert done.returncode == 0, done.stderr
-    assert float(done.stderr) < 20e5
+    assert float(done.stderr) == 1.0
     assert not list(tmp_path.glob("drilling*"))  # and takes it away
 
 
 def test_processes_that_start_together_share_one_copy_of_the_sources(fmus, tmp_path):
     cache = tmp_path / "cache"
-    fmu = str(fmus / "Supply.fmu")
-    command = [sys.executable, "-c", HOST, fmu, ABSENT, "supply_pressure"]
+    fmu = str(fmus / "RockFilter.fmu")
+    command = [sys.executable, "-c", HOST, fmu, ABSENT, "apparent_energy"]
     environment = {**os.environ, "PYTHONPATH": "", "PERCUSSION_FMU_CACHE": str(cache)}
     several = [
         subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=environment)

@@ -14,6 +14,7 @@ from fmu_src.parts import (
     supply,
 )
 from fmu_src.parts.build import part_variables
+from tests.system.models import begun
 
 PARTS = (controller, drill_string, rig_feed, rock_profile, supply)
 # Starts at which everything touches, hangs apart, or already moves.
@@ -50,9 +51,7 @@ def test_a_part_depends_on_the_inputs_that_it_names(module):
         inputs = {name: drawn(rng, entry[3], *entry[1:3]) for name, entry in part.inputs.items()}
 
         def outputs(parameters=parameters, **given):
-            model = part.slave.MODEL(dict(parameters))
-            model.begin(dict(given))
-            return model.outputs()
+            return begun(part.name, parameters, given).outputs()
 
         base = outputs(**inputs)
         for name, value in base.items():

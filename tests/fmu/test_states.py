@@ -62,7 +62,7 @@ def test_a_state_that_never_was_bytes_repeats_too(make, name):
 
 
 @pytest.mark.parametrize(("name", "of"), [(RIGID[0], RIGID[1]), (RIGID[1], RIGID[0]),
-                                          (RIGID[0], "Supply")])  # fmt: skip
+                                          (RIGID[0], "RockFilter")])  # fmt: skip
 def test_a_state_of_another_fmu_of_the_process_is_refused(make, name, of):
     instance, other = make(name), make(of)
     state = other.slave.getFMUstate()

@@ -116,7 +116,7 @@ def test_variables_of_fmi2_are_those_of_the_other_fmu(scene):
 def test_fmi3_says_of_each_variable_what_fmi2_does(fmu3, scene):
     by_name = {one.name: one for one in hammer_variables(scene)}
     nodes = {node.get("name"): node for node in etree.fromstring(read(fmu3)).find("ModelVariables")}
-    arranged = fmi3_variables(scene)
+    arranged = fmi3_variables(hammer_variables(scene))
     assert list(nodes) == [one.name for one in arranged]
     assert sorted(name for one in arranged for name in one.members) == sorted(by_name)
     for entry in arranged[1:]:
@@ -143,7 +143,7 @@ def test_fmi3_says_of_each_variable_what_fmi2_does(fmu3, scene):
 
 
 def test_arrays_of_fmi3():
-    names = {one.name: one for one in fmi3_variables(SCENES["stepped"])}
+    names = {one.name: one for one in fmi3_variables(hammer_variables(SCENES["stepped"]))}
     assert names["piston.sections.area"].dimensions == (2,)
     assert names["bit.sections.area"].dimensions == (1,)
     assert names["feed_force"].dimensions == ()
@@ -175,7 +175,7 @@ def test_structure_of_fmi3_is_that_of_fmi2(fmu3, scene):
         }
         for node in root.find("ModelStructure/InitialUnknowns")
     }
-    arranged = {str(one.reference): one.members for one in fmi3_variables(scene)}
+    arranged = {str(one.reference): one.members for one in fmi3_variables(hammer_variables(scene))}
     structure = etree.fromstring(read(fmu3)).find("ModelStructure")
     outputs = {
         node.get("valueReference"): node.get("dependencies") for node in structure.findall("Output")

@@ -118,6 +118,15 @@ def linked(monkeypatch):
     return names
 
 
+def test_a_part_of_a_system_comes_in_both_versions(built_library, tmp_path, capsys):
+    assert percussion("native", "RigFeed", "-o", tmp_path) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [Path(one.split()[0]).name for one in lines] == ["RigFeed.fmu", "RigFeed-fmi3.fmu"]
+    assert {path.name for path in tmp_path.iterdir()} == {"RigFeed.fmu", "RigFeed-fmi3.fmu"}
+    assert percussion("native", "RigFeed", "--rock", "granite", "-o", tmp_path) == 2
+    assert "RigFeed: is no hammer" in capsys.readouterr().err
+
+
 def test_of_two_at_once_one_compiles_and_the_other_waits(linked, tmp_path, capsys):
     found = []
     both = [

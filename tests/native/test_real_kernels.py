@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 from fmpy import extract, read_model_description
 
-from fmu_src.native.library import ENGINE, HERE, MODULES, libraries
+from fmu_src.native.library import ENGINE, HAMMER, HERE, OF, libraries
 from percussion_model import Scene
 from percussion_model.engine.compiler import FLAGS, definitions, objects
 from percussion_model.engine.platforms import PLATFORMS, this_platform
@@ -131,7 +131,7 @@ def test_sequences_of_any_calls(host, unpack, name, count, monkeypatch):
 @long
 def test_sanitizers_see_nothing(unpack, tmp_path):
     """In the shell, with the real kernels."""
-    parts = objects(MODULES, [this_platform()])[this_platform()]
+    parts = objects(OF[HAMMER], [this_platform()])[this_platform()]
     library = tmp_path / "checked.so"
     sources = [*map(str, sorted(HERE.glob("*.c"))), str(ENGINE / "memory.c"), *map(str, parts)]
     subprocess.run(

@@ -206,7 +206,7 @@ def scenes():
 
 def test_variables_of_fmi3_are_those_of_fmi2():
     for scene in scenes():
-        two, three = hammer_variables(scene), fmi3_variables(scene)
+        two, three = hammer_variables(scene), fmi3_variables(hammer_variables(scene))
         members = [name for one in three for name in one.members]
         assert sorted(members) == sorted(one.name for one in two)
         assert len({one.reference for one in three}) == len({one.name for one in three})

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from fmu_src.hammer.build import build_hammer
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan, write_system
+from percussion_model import Scene
 from percussion_model.coupling import bench
 
 
@@ -28,11 +30,11 @@ def feed_control(fmus, tmp_path_factory):
 
 
 @pytest.fixture
-def without_library(tmp_path, monkeypatch):
+def without_library(fmus, tmp_path):
     """The same with a hammer that runs by numba."""
-    monkeypatch.setattr("fmu_src.hammer.build.library_here", dict)
-    plan = plan_of("feed_control")
-    return write_system(plan, build_fmus(plan, tmp_path / "parts"), tmp_path / "FeedControl.ssp")
+    plan, path = plan_of("feed_control"), tmp_path / "RigidHammer.fmu"
+    build_hammer(Scene.from_toml(plan.hammer), path, libraries={})
+    return write_system(plan, fmus | {"hammer": path}, tmp_path / "FeedControl.ssp")
 
 
 @pytest.fixture(scope="session")

@@ -75,7 +75,7 @@ def test_the_seeker_climbs_a_known_hill(start):
     inputs = start_inputs("DrillController") | {"feed_setpoint": start}
     late = [start] * 25
     for _ in range(12_000):
-        late.append(control.wanted)
+        late.append(control.outputs()["feed_wanted"])
         feed = late.pop(0)
         inputs |= {"feed_force": feed, "rate_of_penetration": feed * math.exp(-feed / 3000.0)}
         control.step(inputs, 1e-2)
@@ -84,11 +84,10 @@ def test_the_seeker_climbs_a_known_hill(start):
 
 def climb(control, rate, seconds, feed_by_pressure=0.0, late=25, step=1e-2):
     """Let a controller seek on a hill; feed and pressure arrive late, the rate later."""
-    inputs = start_inputs("DrillController")
-    inputs |= {"feed_setpoint": control.wanted, "pressure_setpoint": control.pressure}
-    feeds, pressures = [control.wanted] * late, [control.pressure] * late
-    rates = [rate(control.wanted, control.pressure)] * 5
-    first = control.pressure
+    found, inputs = control.outputs(), start_inputs("DrillController")
+    wanted, first = found["feed_wanted"], found["pressure_command"]
+    inputs |= {"feed_setpoint": wanted, "pressure_setpoint": first}
+    feeds, pressures, rates = [wanted] * late, [first] * late, [rate(wanted, first)] * 5
     for _ in range(round(seconds / step)):
         found = control.outputs()
         feeds.append(found["feed_wanted"])
@@ -148,13 +147,13 @@ def test_pressure_stays_where_it_is_not_sought():
 def test_a_void_ends_the_window_of_the_seeker():
     control = make_model("DrillController", seek__on=True)
     climb(control, ridge, 5.0)
-    before = control.seeker.centres[0]
+    before = control.state["centres"][0]
     inputs = start_inputs("DrillController") | {"feed_setpoint": 2500.0}
     for _ in range(300):
         control.step(inputs | {"head_velocity": 0.3, "rate_of_penetration": 9.0}, 1e-2)
-    assert control.mode == 1
-    assert control.seeker.centres[0] == before
-    assert control.seeker.phase == 0.0
+    assert control.outputs()["mode"] == 1
+    assert control.state["centres"][0] == before
+    assert control.state["phase"] == 0.0
 
 
 def test_the_state_of_the_seeker_is_saved():

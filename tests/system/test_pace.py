@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from percussion_model.coupling import Coupling, CouplingError
-from percussion_model.coupling.compiled import CALL, DONE, make_calls
-from percussion_model.coupling.compiled import STEP as STEP_CALL
+from percussion_model.coupling.calls import CALL, DONE, At
+from percussion_model.coupling.calls import STEP as STEP_CALL
 from percussion_model.coupling.port import PacedPort
+from percussion_model.engine.library import entries_of
 
 SLOW = {"rock": 10, "supply": 7}
 STEP = 1e-3  # [s]
@@ -114,23 +115,22 @@ def test_other_threads_go_on_while_an_fmu_computes():
     # usleep stands in for fmi2DoStep: its time is where the instance would be
     calls["kind"], calls["component"], calls["every"] = STEP_CALL, 300_000, 1
     calls["function"] = ctypes.cast(ctypes.CDLL(None).usleep, ctypes.c_void_p).value
-    room, at = np.zeros(1), np.array([0, 1, 0, 0])
-    rest = np.zeros(1, np.int64), room, room, np.zeros(1, np.int32), at, 0.0, 1e-3
-    make_calls(calls[:0], *rest)
+    at, room = np.array([0, 1, 0, 0, 1, 1, 1, 1]), np.zeros((4, 1))
     ticks, over = [], threading.Event()
 
     def tick():
         while not over.wait(1e-3):
             ticks.append(None)
 
-    thread = threading.Thread(target=tick)
+    thread = threading.Thread(target=tick, daemon=True)
     thread.start()
     before = len(ticks)
-    make_calls(calls, *rest)
+    arrays = [one.ctypes.data for one in (calls, *room, at)]
+    assert entries_of("calls").run(*arrays, 1, 0.0, 1e-3) == 1
     during = len(ticks) - before
     over.set()
     thread.join()
-    assert at[2] == DONE
+    assert at[At.FAILED_CALL] == DONE
     assert during > 10
 
 

@@ -90,9 +90,9 @@ def test_it_builds_what_is_named_or_all_and_tells_the_share(tmp_path, monkeypatc
     def noted(text, done=0.0):
         yield lambda text, share: told.append((text, share))
 
-    monkeypatch.setattr(archive, "build_fmus", lambda plan, folder, force, flat: {})
+    monkeypatch.setattr(archive, "build_fmus", lambda *_: {})
     monkeypatch.setattr(archive, "write_system", lambda plan, fmus, path: path)
-    monkeypatch.setattr(library, "library_here", dict)
+    monkeypatch.setattr(library, "libraries", lambda *_, **__: {})
     monkeypatch.setattr(progress, "progress", noted)
     names = [plan.name for plan in plans()]
     for words, wanted in (

@@ -7,11 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from models import make_model, start_inputs
 
-from fmu_src.parts.part import form_fault
+from fmu_src.parts.python_part import form_fault
 from fmu_src.parts.rock_filter import TABLE, RockFilter
-from fmu_src.parts.rock_profile import TABLE as ROCK
-from fmu_src.parts.rock_profile import RockProfile
 from fmu_src.system.archive import build_fmus, read_plan, write_system
 from percussion_model import Simulation, SimulationError
 from percussion_model.analysis.identify.observation import Q
@@ -130,13 +129,10 @@ def test_in_its_system_it_tells_the_rock_and_the_pressure_follows(built_library,
 
 
 def test_layers_have_a_crushing_energy():
-    starts = {name: entry[3] for name, entry in ROCK.parameters.items()}
-    rock = RockProfile({**starts, "layers[2].top": 0.5, "layers[2].crushing_energy": 9e7})
-    inputs = {"bit_position": 0.0, "feed_force": 2500.0, "supply_pressure": 2e6, "bit_torque": 0.0}
-    rock.begin(inputs)
-    assert rock.signals()["crushing_energy"] == 5.5e7
-    rock.step({**inputs, "bit_position": 0.6}, 1e-3)
-    assert rock.signals()["crushing_energy"] == 9e7
+    rock = make_model("RockProfile", **{"layers[2].top": 0.5, "layers[2].crushing_energy": 9e7})
+    assert rock.outputs()["crushing_energy"] == 5.5e7
+    rock.step({**start_inputs("RockProfile"), "bit_position": 0.6}, 1e-3)
+    assert rock.outputs()["crushing_energy"] == 9e7
 
 
 def test_a_crushing_energy_that_changes_changes_the_rate_in_inverse_proportion():

@@ -21,19 +21,19 @@ def struck_bit(step, rock, damping_ratio, **values):
     """Energies of the bit after each step [J], and the string."""
     string = make_model("DrillString", friction__viscosity=0.0, **values)
     inputs = start_inputs("DrillString")
-    inputs["head_force"] = PUSH - string.body.weight
+    inputs["head_force"] = PUSH - string.outputs()["weight"]
     turn = 2.0 * damping_ratio * math.sqrt(rock / MASS)
     push = expm(step * np.array([[0, 1, 0], [-rock / MASS, -turn, 1 / MASS], [0, 0, 0]]))
     # without rock a constant force holds against the feed
     rest, against = (PUSH / rock, 0.0) if rock else (0.0, PUSH)
     state, energies = np.array([rest, SPEED]), []
-    force = string.force
+    force = string.outputs()["feed_force"]
     # a long step makes a soft shoulder, which swings slowly
     for _ in range(round(0.4 / step) + 250):
         moved = push @ [*state, force - against]
         inputs["bit_position"] = state[0]
         string.step(inputs, step)
-        state, force = moved[:2], string.force
+        state, force = moved[:2], string.outputs()["feed_force"]
         energies.append(0.5 * MASS * state[1] ** 2 + 0.5 * rock * (state[0] - rest) ** 2)
     return np.array(energies), string
 
@@ -46,7 +46,7 @@ def test_a_struck_bit_comes_to_rest_at_any_step(step, rock):
     assert energies.max() < 1.5 * at_first
     last = round(0.1 / step)
     assert energies[-last:].max() < 0.2 * at_first
-    assert string.mean_force == pytest.approx(PUSH, rel=0.02)
+    assert string.outputs()["feed_force_mean"] == pytest.approx(PUSH, rel=0.02)
 
 
 def test_it_is_the_limit_that_brings_the_bit_to_rest():
@@ -73,14 +73,14 @@ def test_momentum_of_the_string_is_its_impulses(model, step):
     """Head, bit, weight, wall: to the last digits, at any step, with the drive's reaction."""
     string = make_model("DrillString", model=model, friction__force=20.0)
     inputs = start_inputs("DrillString")
-    inputs["head_force"] = 2500.0 - string.body.weight
+    inputs["head_force"] = 2500.0 - string.outputs()["weight"]
     impulse = 0.0
     for k in range(round(0.1 / step)):
         inputs["casing_impulse"] = impulse
         string.step(inputs, step)
         impulse += 3000.0 * math.sin(2.0 * math.pi * 22.0 * k * step) * step
-    found = string.outputs()
-    due = string.head_impulse_due + string.casing_impulse_due
-    weight = string.body.weight * (string.time - string.lag)
+    found, state = string.outputs(), string.state
+    due = state["head_impulse_due"] + state["casing_impulse_due"]
+    weight = found["weight"] * (state["time"] - state["lag"])
     wanted = found["head_impulse"] - found["bit_impulse"] + inputs["casing_impulse"] + weight - due
     assert found["momentum"] + found["wall_momentum"] == pytest.approx(wanted, abs=1e-6)

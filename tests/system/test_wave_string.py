@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 import os
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+from models import String, make_model, start_inputs
 from numpy.polynomial import legendre
 from scipy.integrate import solve_ivp
 
-from fmu_src.parts.string_packets import DEGREES, PLACES, SHARES, Packet, Packets, projected
-from fmu_src.parts.wave_string import _DOWN, _UP, TABLE, WaveString
+from fmu_src.parts import string_body, wave_string
+from fmu_src.parts import string_packets as packets
+from fmu_src.parts.string_packets import COMING, DEGREES, FINE, FINE_WEIGHTS, PLACES, SHARES
+from fmu_src.parts.wave_string import _DOWN, _UP, TABLE
 from fmu_src.system.archive import SYSTEMS, build_fmus, read_plan, write_system
 from percussion_model import Scene, Simulation
 from percussion_model.components.shoulder import follow, on_bit
@@ -26,19 +30,72 @@ FREE = {**VALUES, "gravity": 0.0, "friction.viscosity": 0.0}
 NOTHING = np.zeros(DEGREES)
 
 
+class Packet(NamedTuple):
+    """A wave over a time: shares of Legendre polynomials from its begin on."""
+
+    begin: float
+    span: float
+    shares: np.ndarray
+
+    @property
+    def square(self):
+        return self.span * packets.square(self.shares, 0)
+
+
+def projected(given, begin, span):
+    """The wave of successive packets over another time."""
+    found = np.zeros(DEGREES)
+    for one in given:
+        packets.project(one.shares, 0, one.begin, one.span, found, 0, begin, span)
+    return Packet(begin, span, found)
+
+
+class Packets(String):
+    """Rods alone."""
+
+    def __init__(self, values, rods):
+        super().__init__(TABLE, {**values, "start.rods": rods})
+        places = wave_string.down_at(self.p), wave_string.up_at(self.p)
+        self.given = self.p, self.s, self.w, *places
+        self.step = string_body.step_of(self.p)
+        self.impedance = string_body.impedance_of(self.p)
+
+    @property
+    def cells(self):
+        return self.count * int(self.p["rod_cells"])
+
+    @property
+    def stored(self):
+        return packets.stored_in_packets(*self.given)
+
+    def leaving(self, ahead):
+        packets.leave(*self.given[:4], ahead, COMING)
+        return self.w.made[COMING:][:DEGREES].copy()
+
+    def advance(self, head_force, coming, free):
+        self.w.made[COMING:][:DEGREES] = coming
+        packets.advance_packets(*self.given, head_force, free)
+
+
 def energy(body, head=0.0):
     return body.stored + body.port_work + body.friction_loss - body.weight_work - head
 
 
+def test_places_and_weights_are_those_of_gauss_and_legendre():
+    for places, weights in ((PLACES, packets.WEIGHTS), (FINE, FINE_WEIGHTS)):
+        wanted = legendre.leggauss(len(places))
+        np.testing.assert_allclose((places, weights), wanted, rtol=1e-12, atol=1e-15)
+
+
 def test_a_projection_keeps_polynomials_and_makes_no_energy():
     rng = np.random.default_rng(4)
-    packets = [Packet(0.3 * k, 0.3, rng.normal(size=DEGREES)) for k in range(4)]
-    same = projected(packets, 0.3, 0.3)
-    np.testing.assert_allclose(same.shares, packets[1].shares, atol=1e-12)
-    whole = projected(packets, 0.0, 1.2)
-    assert whole.square <= sum(one.square for one in packets)
+    given = [Packet(0.3 * k, 0.3, rng.normal(size=DEGREES)) for k in range(4)]
+    same = projected(given, 0.3, 0.3)
+    np.testing.assert_allclose(same.shares, given[1].shares, atol=1e-12)
+    whole = projected(given, 0.0, 1.2)
+    assert whole.square <= sum(one.square for one in given)
     # means are kept by any
-    mean = np.mean([one.shares[0] for one in packets])
+    mean = np.mean([one.shares[0] for one in given])
     assert whole.shares[0] == pytest.approx(mean, rel=1e-12)
 
 
@@ -65,8 +122,8 @@ def test_a_wave_comes_back_from_the_head_after_twice_the_length(mass):
 
 def test_a_string_at_rest_stays_and_gives_a_steady_wave():
     body = Packets(VALUES, 4)
-    body.rest(2600.0)
-    push = 2600.0 - body.weight
+    packets.rest_packets(*body.given, 2600.0)
+    push = 2600.0 - string_body.weight_of(body.p, 4, 0.0)
     for _ in range(50):
         down = body.leaving(0)
         assert down[0] == pytest.approx(2600.0 / (2.0 * body.impedance), rel=1e-10)
@@ -80,7 +137,7 @@ def test_a_string_at_rest_stays_and_gives_a_steady_wave():
 def test_the_balance_of_energy_closes_whatever_comes(friction):
     rng = np.random.default_rng(6)
     body = Packets({**VALUES, **friction}, 3)
-    body.rest(1000.0)
+    packets.rest_packets(*body.given, 1000.0)
     start, work = body.stored, 0.0
     for k in range(200):
         before, force = body.head, 3e3 * math.sin(0.05 * k)
@@ -88,7 +145,7 @@ def test_the_balance_of_energy_closes_whatever_comes(friction):
         work += force * (body.head - before)
         if k == 100:
             brought = body.stored
-            body.add_rod()
+            packets.add_to_packets(*body.given)
             start += body.stored - brought
     assert body.friction_loss > 0.0
     assert energy(body, work) == pytest.approx(start, abs=1e-9 * body.friction_loss)
@@ -96,7 +153,7 @@ def test_the_balance_of_energy_closes_whatever_comes(friction):
 
 def test_a_step_longer_than_the_rods_delay_a_wave_is_refused():
     with pytest.raises(ValueError, match=r"communication_step = 0.01 s: must be at most"):
-        WaveString({**VALUES, "communication_step": 0.01})
+        make_model("WaveString", communication_step=0.01)
 
 
 class Partner:
@@ -166,18 +223,16 @@ def test_no_passive_partner_shakes_the_casing():
 def drilled(h, end=0.1):
     """Depth [m] and rate [m/s] of a rigid hammer on a string, after a time."""
     weight, feed = 400.0, 3000.0
-    string = WaveString({**VALUES, "communication_step": h, "start.feed_force": feed,
-                         "start.force": feed - weight})  # fmt: skip
+    string = make_model("WaveString", communication_step=h, start__feed_force=feed,
+                        start__force=feed - weight)  # fmt: skip
+    sent, inputs = string.outputs(), start_inputs("WaveString")
     changes = {
         "feed.force": 0.0, "effects.shoulder": True,
-        "shoulder.impedance": string.body.impedance, "shoulder.start_force": feed,
+        "shoulder.impedance": sent["impedance"], "shoulder.start_force": feed,
     }  # fmt: skip
     simulation = Simulation(Scene().computed_by("rigid").replace(**changes), record_events=False)
-    inputs = {name: entry[3] for name, entry in TABLE.inputs.items()}
-    inputs["head_force"] = feed + 1800.0 - weight - string.body.weight  # less the recoil
-    string.begin(inputs)
+    inputs["head_force"] = feed + 1800.0 - weight - sent["weight"]  # less the recoil
     for k in range(round(end / h)):
-        sent = string.signals()
         seen = simulation.observe()
         names = ("wave_begin", "wave_span", *_DOWN)
         simulation.set_inputs(**{f"shoulder_{name}": sent[name] for name in names})
@@ -186,6 +241,7 @@ def drilled(h, end=0.1):
         for name in ("push", "returned_begin", "returned_until", *_UP):
             inputs[name] = seen[f"shoulder_{name}"]
         string.step(inputs, h)
+        sent = string.outputs()
     blows = simulation.blows
     return seen["bit_position"], blows["hole_advance"].sum() / blows["period"].sum()
 
