@@ -95,7 +95,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         ax.clabel(lines, fmt="%g m³/min", fontsize=8.0)
         ax.plot(SCENE[EDGE] * MM, SCENE[SUPPLY] / BAR, "o", color="white", mec="black")
         ax.grid(False)
-        title = "Blow power by air power; free air (white)"
+        title = "Blow power / air power; free air (white)"
         style.label(ax, "upper intake opens at [mm]", "supply pressure, gauge [bar]", title)
         _draw_tuned(fig.add_subplot(cells[:, 2]), edge, tuned)
         style.head(fig, "A 5-inch hammer on air: what its chambers do, and where a port is best")

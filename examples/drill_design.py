@@ -108,7 +108,9 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         middle.minorticks_off()
         middle.grid(False)
         title = f"Piston of {STEPPED_RATIO:g} bit lengths, stepped"
-        style.label(middle, "lower section by length [-]", "its area by that above [-]", title)
+        style.label(
+            middle, "lower section / length of the piston [-]", "its area / that above [-]", title
+        )
         _draw_designs(right, blows, shown, stress)
         style.head(fig, f"Where {ENERGY:g} J of a blow go")
     return {"blows": blows, "rates": rates, "rate_errors": errors, "stress": stress, "best": found}
@@ -123,7 +125,7 @@ def _draw_lengths(ax: Axes, ratio: np.ndarray, rock: dict[float, np.ndarray]) ->
     ax.axvline(REFERENCE.piston.length / BIT.length, color=GREY, lw=0.8, ls=":", label="reference")
     ax.set_ylim(0.0, 100.0)
     ax.legend(loc="lower right")
-    style.label(ax, "piston by bit length [-]", "energy in the rock [%]", "Uniform piston")
+    style.label(ax, "length of piston / bit [-]", "energy in the rock [%]", "Uniform piston")
 
 
 def _draw_designs(

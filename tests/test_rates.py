@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -219,3 +220,19 @@ def test_the_page_has_these_numbers():
         assert case.source["published"] in page
     assert all(row["lacks"] in page for row in stored.unused)
     assert all(row["what"] in page for row in stored.wanted)
+
+
+def test_the_documents_count_the_rates_within_their_intervals_as_the_table_does():
+    rows = re.findall(r"^\| (top|dth)_.*? \| ([\d.]+) \|[^|]*\| ([\d.]+) to ([\d.]+) \|",
+                      (DOCS / "data/rates.md").read_text(encoding="utf-8"), re.M)  # fmt: skip
+    inside = {
+        kind: [
+            float(low) <= float(rate) <= float(high) for one, rate, low, high in rows if one == kind
+        ]
+        for kind in ("top", "dth")
+    }
+    top, down = (rf"{sum(one)} of (the )?{len(one)}" for one in inside.values())
+    for page in ("README.md", "docs/field.md", "docs/data/rates.md", "paper/paper.md"):
+        text = " ".join((DOCS.parent / page).read_text(encoding="utf-8").split())
+        assert re.search(rf"\b{top}\b", text), page
+        assert page == "README.md" or re.search(rf"\b{down}\b", text), page

@@ -160,6 +160,9 @@ def test_a_metric_that_fails_takes_no_other_number_from_its_point(whole, tmp_pat
     )
     told = "metric soft_only: ValueError: too hard"
     assert found.failures == [told if one else "" for one in hard]
+    first = f"{hard.sum()} of {len(hard)}, the first at {found.place(int(np.argmax(hard)))}: {told}"
+    assert dict(found.headlines())["Failed"] == first
+    assert "Failed" not in dict(whole.headlines())
 
 
 def test_a_metric_that_cannot_be_a_column_or_go_to_processes_is_refused(tmp_path):

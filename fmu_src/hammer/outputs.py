@@ -87,7 +87,7 @@ ALL = (*PLAIN_INPUTS, *DRIVE_INPUTS)
 _FORCE, _SPEED, _ENERGY, _FAR = 1e12, 1e4, 1e12, 1e6
 # In the order of the model description; value references come from the interface.
 OUTPUTS: dict[str, Output] = {
-    "rate_of_penetration": Output("m/s", -_SPEED, _SPEED, 1e-2, "advance of the hole over the last whole blow by its period: of one blow, which is no mean where blows differ (take hole_depth by time); falls towards 0 after two missed periods", _rate),
+    "rate_of_penetration": Output("m/s", -_SPEED, _SPEED, 1e-2, "advance of the hole over the last whole blow divided by its period: of one blow, which is no mean where blows differ (take hole_depth divided by time); falls towards 0 after two missed periods", _rate),
     "hole_depth": Output("m", -_FAR, _FAR, 1e-2, "depth of the rock's surface if the bit were unloaded now, since the start; it never falls, and is 0 on a rock that is not crushed", Sample("hole_depth")),
     "bit.position": Output("m", -_FAR, _FAR, 1e-2, "mean displacement of the bit since the start, down positive", Sample("bit_position")),
     "bit.velocity": Output("m/s", -_SPEED, _SPEED, 1.0, "mean velocity of the bit, down positive", Sample("bit_velocity"), at_start=()),

@@ -207,12 +207,12 @@ def _tried(file: Path, name: str) -> tuple[str, dict[str, Any]]:
         part.begin()
         starts = own.arguments_of(given) if own.is_maker(given) else {}
         model = own.OwnController({**starts, own.SOURCE: file, own.NAME: name})
+        for step in (0.0, STEP_SIZE, STEP_SIZE):
+            part.step(0.0, step)
+            part.reader(own.SIGNALS).read()
+            model.step(inputs, step)
     except CouplingError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise CouplingError(f"{file}:{name}: {type(error).__name__}: {error}") from None
-    for step in (0.0, STEP_SIZE, STEP_SIZE):
-        part.step(0.0, step)
-        part.reader(own.SIGNALS).read()
-        model.step(inputs, step)
     return model.why_not_saved(), starts

@@ -6,7 +6,9 @@ import hashlib
 import importlib.util
 import inspect
 import json
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, ModuleType, NoneType
@@ -33,13 +35,23 @@ class Inputs(dict[str, Any]):
         raise ValueError(f"there is no input {name!r}: {said_among(name, self)}")
 
 
+@contextmanager
+def no_exit() -> Iterator[None]:
+    """A file that ends the program, as `sys.exit` does, is at fault: its host shall go on."""
+    try:
+        yield
+    except SystemExit as error:
+        raise ValueError(f"the controller ends the program: SystemExit({error})") from error
+
+
 def loaded(file: Path, name: str) -> Callable[..., Any]:
     """What a name of a file stands for, the file run anew: nothing is left of another instance."""
     spec = importlib.util.spec_from_file_location("controller_of_user", file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    with no_exit():
+        spec.loader.exec_module(module)
     found: Callable[..., Any] | None = getattr(module, name, None)
     if not callable(found):
         raise ValueError(f"{file.name} has no function or class {name}")
@@ -71,7 +83,8 @@ class OwnController(Model):
         own = dict(parameters)
         given = loaded(own.pop(SOURCE), own.pop(NAME))
         super().__init__(own)
-        self.work: Callable[..., Any] = given(**own) if is_maker(given) else given
+        with no_exit():
+            self.work: Callable[..., Any] = given(**own) if is_maker(given) else given
         self.sent: dict[str, Any] = {}
 
     def begin(self, inputs: dict[str, Any]) -> None:
@@ -81,7 +94,8 @@ class OwnController(Model):
     def step(self, inputs: dict[str, Any], step_size: float) -> None:
         """One call of the callable."""
         given = Inputs({name: inputs[name] for name in INPUTS})
-        sent = self.work(given, self.time, step_size)
+        with no_exit():
+            sent = self.work(given, self.time, step_size)
         if not isinstance(sent, Mapping):
             raise ValueError(f"the controller gave {sent!r:.40}, not outputs by their names")
         lacking = [name for name in SIGNALS if name not in sent]
@@ -92,6 +106,9 @@ class OwnController(Model):
             "pressure_command": float(sent["pressure_command"]),
             "percussion_on": bool(sent["percussion_on"]),
         }
+        for name, value in self.sent.items():
+            if not math.isfinite(value):
+                raise ValueError(f"the controller gave {name} = {value}: must be a finite number")
 
     def outputs(self) -> dict[str, Any]:
         """What it gave last."""

@@ -21,6 +21,11 @@ RATE = "rate_of_penetration"
 SAMPLES = 48
 # Shares of the samples below and above which the interval ends.
 ENDS = 0.05, 0.95
+# What no interval holds (docs/field.md).
+NOT_CALIBRATED = (
+    "Real drills differ more: without a calibration on site the rate may be off by a factor of 2 "
+    "or more."
+)
 # Runs of rigid bodies that tell how a rate changes [s].
 DURATION, SETTLE = 2.0, 0.5
 
@@ -44,8 +49,7 @@ def interval_text(found: RateInterval, summary: Mapping[str, Any]) -> str:
     return (
         f"Rate: {driller_text(summary, RATE)} {one.unit} numerical; {low} to {high} {one.unit} "
         f"by the intervals of {found.rock} and bit, which hold nine tenths of {found.samples} "
-        "samples. Drills differ further: the model is no better than a factor 2 without a "
-        "calibration on site."
+        f"samples. {NOT_CALIBRATED}"
     )
 
 

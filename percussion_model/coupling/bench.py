@@ -356,6 +356,7 @@ def bench(
                 on_way=None if trial.on_way is None else trial.on_way(),
                 trust=trust,
             )
+            _refuse_other_system(coupling)
             coupling.start = 0.0  # disturbances and scores count from there
             run = coupling.run(trial.duration, step, SIGNALS, step, progress=watch, tell=tell)
             runs.append(judge(trial, run))
@@ -364,6 +365,23 @@ def bench(
         if progress is not None:
             progress(found[-1])
     return found
+
+
+def _refuse_other_system(coupling: Coupling) -> None:
+    """Raise `CouplingError` for a system without the signals that scores are made of."""
+    outputs = coupling.outputs
+    wanted = [signal.split(".", 1) for signal in SIGNALS]
+    lacking = [
+        f"{part}.{name}"
+        for part, name in wanted
+        if part != "controller" and name not in outputs.get(part, ())
+    ]
+    if lacking:
+        coupling.free()
+        raise CouplingError(
+            f"{coupling.path.name} has no {', '.join(lacking)}: the bench needs FeedControl or "
+            "FeedControlRigid"
+        )
 
 
 def _refuse_changed(controller: Any, before: Mapping[str, bytes]) -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import copy
+import functools
 import inspect
 import pickle
 import types
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from percussion_model.coupling.component import CouplingError
+from percussion_model.scene.rows import said_among
 
 REMEDY = "give its class, a factory without arguments, or an object with reset()"
 
@@ -68,6 +70,27 @@ def fresh(name: str, given: Callable[..., Any], is_new: bool = False) -> Callabl
             f"{name}: {_title(given)} keeps values and cannot be copied for each run "
             f"({type(error).__name__}: {error}): {REMEDY}"
         ) from error
+
+
+def with_values(given: Callable[..., Any], values: Mapping[str, Any]) -> Callable[..., Any]:
+    """What a class or a factory makes with values of its arguments, by name.
+
+    Raises
+    ------
+    CouplingError
+        If it is neither, or has no such argument.
+    """
+    if not (inspect.isclass(given) or _is_factory(given)):
+        raise CouplingError(
+            f"{_title(given)} is a function, which has no variables to set: {REMEDY}"
+        )
+    known = list(inspect.signature(given).parameters)
+    for name in values:
+        if name not in known:
+            raise CouplingError(
+                f"{_title(given)} has no argument {name}: {said_among(name, known)}"
+            )
+    return functools.partial(given, **values)
 
 
 def kept_values(given: object) -> dict[str, bytes]:

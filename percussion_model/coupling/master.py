@@ -141,7 +141,11 @@ class Coupling:
                 self.parts[name] = kind(name, folders[name], description)
         self._parameters = values
         for signal, value in given.items():  # before those of the archive
-            component, variable = place_of(signal, values)
+            component, variable = place_of(signal, descriptions)
+            if component not in values and component in descriptions:
+                raise CouplingError(
+                    f"{signal}: {component} is a Python callable, which has no variables to set"
+                )
             if component not in values:
                 raise CouplingError(
                     f"{signal}: there is no FMU {component} in {self.path.name}: "

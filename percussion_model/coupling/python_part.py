@@ -51,17 +51,17 @@ class PythonPart:
             self.work: Work = fresh(self.name, self.given)
         except CouplingError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failure(error) from error
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
         try:
             self.outputs = dict(self.work(Inputs(self.inputs), time, step))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failure(error) from error
 
-    def _failure(self, error: Exception) -> CouplingError:
+    def _failure(self, error: BaseException) -> CouplingError:
         kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
         return CouplingError(f"{self.name}: {kind}{error}{_source_place(error)}")
 
@@ -117,7 +117,7 @@ def input_starts(name: str, description: Any, values: Mapping[str, Any]) -> dict
     return found
 
 
-def _source_place(error: Exception) -> str:
+def _source_place(error: BaseException) -> str:
     """File and line of a fault in a callable; faults of syntax have them in their text."""
     if isinstance(error, SyntaxError):
         return ""

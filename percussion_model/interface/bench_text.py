@@ -17,7 +17,7 @@ from percussion_model.simulation.uncertain import in_digits, scaled, with_short_
 # Name, head, factor, and what it is.
 COLUMNS = (
     ("depth", "depth [mm]", 1e3, "of the bit at the end"),
-    ("energy_per_metre", "energy [MJ/m]", 1e-6, "work of supply and rig by the depth"),
+    ("energy_per_metre", "energy [MJ/m]", 1e-6, "work of supply and rig divided by the depth"),
     ("feed_error", "feed error [%]", 100.0, "mean distance of the feed from what is wanted"),
     ("overshoot", "overshoot [%]", 100.0, "greatest feed above what is wanted"),
     ("swing", "swing [%]", 100.0, "half the range of the feed in the last second"),

@@ -76,9 +76,9 @@ def notes(found: Profile) -> list[str]:
     said = [
         *found.samples.notes,
         f"Noise of a sample, and error of the table: {shown}.",
-        "A rate shows the crushing energy by the efficiency of the bit; the strength has the "
-        "interval of the efficiency and of the relation as well. A bit that wears seems to meet "
-        "harder rock.",
+        "A rate shows the crushing energy divided by the efficiency of the bit; the strength has "
+        "the interval of the efficiency and of the relation as well. A bit that wears seems to "
+        "meet harder rock.",
     ]
     if not found.determined()["renewal_length"]:
         said.append(

@@ -218,13 +218,8 @@ def settled_error(found: Settled) -> str:
 
 
 def show_study(found: Study) -> None:
-    """Print the headlines of a study, and how many of its points failed."""
+    """Print the headlines of a study."""
     print_table(named_table(found.headlines()))
-    failed = [k for k, text in enumerate(found.failures) if text]
-    if failed:
-        first = f"{found.place(failed[0])}: {found.failures[failed[0]]}"
-        count = f"{len(failed)} of {len(found.points)} points failed"
-        show_warnings([f"{count}, the first at {first}"])
 
 
 def show_warnings(warnings: list[str]) -> None:

@@ -20,7 +20,7 @@ SUMMARY_COLUMNS = (
     Column(
         "rate_of_penetration_fixed_window",
         "m/s",
-        "advance of the bit's mean position from the settling time to the end, by that time",
+        "advance of the bit's mean position after the settling time, divided by that time",
     ),
     Column(
         "rate_of_penetration_fixed_window_error",

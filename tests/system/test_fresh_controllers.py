@@ -10,7 +10,7 @@ import pytest
 
 from percussion_model.coupling import Coupling, CouplingError
 from percussion_model.coupling.bench import bench
-from percussion_model.coupling.fresh import CopiedPart
+from percussion_model.coupling.fresh import CopiedPart, with_values
 from percussion_model.interface.cli import main
 
 pytestmark = pytest.mark.usefixtures("brief")
@@ -136,6 +136,24 @@ def test_a_class_that_needs_arguments_is_refused(feed_control):
 
     with pytest.raises(CouplingError, match=r"Tuned cannot be made without arguments .*a factory"):
         bench(feed_control, Tuned, trials=ALONE)
+
+
+def test_arguments_are_set_as_variables_of_an_fmu(feed_control):
+    tuned, plain = (bench(feed_control, one, trials=["collaring"], check_step=False)[0].points
+                    for one in (with_values(PI, {"gain": 0.1}), lambda: PI(gain=0.1)))  # fmt: skip
+    assert tuned == plain
+    for given, text in ((PI, "PI has no argument gian: did you mean gain"),
+                        (PI().work, "work is a function, which has no variables")):  # fmt: skip
+        with pytest.raises(CouplingError, match=text):
+            with_values(given, {"gian": 0.1})
+    with pytest.raises(CouplingError, match=r"gain: controller is a Python callable"):
+        bench(feed_control, PI, {"controller.gain": 0.1})
+
+
+def test_a_system_of_other_signals_is_refused(feed_control, monkeypatch):
+    monkeypatch.setattr("percussion_model.coupling.bench.SIGNALS", ("string.waves", "rig.energy"))
+    with pytest.raises(CouplingError, match=r"has no string.waves: the bench needs FeedControl"):
+        bench(feed_control, PI, trials=ALONE)
 
 
 def test_coupled_runs_go_by_the_same_rule(feed_control):

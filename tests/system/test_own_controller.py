@@ -155,6 +155,10 @@ def test_what_no_state_can_hold_is_named(text, kept, written):
     [
         ("class PI:\n    pass", "cannot be called with inputs, time and step"),
         ("PI = 3", "has no function or class PI"),
+        ("raise SystemExit(3)", "the controller ends the program: SystemExit.3."),
+        ("def PI(inputs, time, step):\n    raise SystemExit", "controller: SystemExit"),
+        ("def PI(inputs, time, step):\n    return {'force_command': float('nan'), "
+         "'pressure_command': 2e6, 'percussion_on': True}", "nan: must be a finite"),
         ("import no_such_package", "ModuleNotFoundError: No module named 'no_such_package'"),
         ("def PI(inputs, time, step):\n    return {}", "gave no force_command"),
         ("def PI(inputs, time, step):\n    return inputs['feed_farce']", "did you mean feed_force"),

@@ -164,6 +164,10 @@ class Study:
         counts = np.bincount(rows["kind"], minlength=len(KINDS)).tolist()
         motions = [f"{n} {kind}" for n, kind in zip(counts, KINDS, strict=True) if n]
         lines = [("Points", f"{len(self.points)}: {', '.join(motions)}")]
+        failed = [k for k, text in enumerate(self.failures) if text]
+        if failed:  # a metric may fail where the rest is known
+            first = f"{self.place(failed[0])}: {self.failures[failed[0]]}"
+            lines.append(("Failed", f"{len(failed)} of {len(self.points)}, the first at {first}"))
         if self.scene.solver_name in ("wave", "modal", "fem"):
             lines.append(("These motions", OF_ONE_GRID))
         rate, undecided = rows["rate_of_penetration"].copy(), self.undecided

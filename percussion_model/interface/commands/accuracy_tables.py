@@ -80,7 +80,7 @@ def show_bars(reference: Reference) -> None:
     )
     _say(
         f"{promise} Histories, through a blow, have no "
-        "one value: theirs is the mean distance by the mean size."
+        "one value: theirs is the mean distance divided by the mean size."
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 from zipfile import is_zipfile
@@ -34,7 +34,11 @@ def bench_controller(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="VARIABLE=VALUE", help="Set a variable of the controller."),
+        typer.Option(
+            "--set",
+            metavar="VARIABLE=VALUE",
+            help="Set a variable of the controller, or an argument of a class or factory.",
+        ),
     ] = None,
     step_check: Annotated[
         bool,
@@ -54,6 +58,9 @@ def bench_controller(
         from percussion_model.coupling.bench import STEP, bench, mean_points, mean_points_error
     common.check_json(json_file)
     values = dict(read_value(f"controller.{text}") for text in settings or ())
+    own = {name.partition(".")[2]: value for name, value in values.items()}
+    given = _load(controller, own)
+    of_fmu = {} if callable(given) else values
     source = None if controller is None else Path(file_and_name(controller)[0])
     claimed = common.claim(
         "bench-controller", out, Path("out") / "bench-controller", force,
@@ -66,7 +73,7 @@ def bench_controller(
     try:
         with interruptible(), progress_bar(0.0) as bar:
             bench(
-                system, _load(controller), values, trials or (), scores.append, trust, bar,
+                system, given, of_fmu, trials or (), scores.append, trust, bar,
                 check_step=step_check, tell=common.print_message,
             )  # fmt: skip
     except KeyboardInterrupt:
@@ -135,10 +142,10 @@ def file_and_name(controller: str) -> tuple[str, str]:
     return (file, name) if file.endswith(".py") else (controller, "")
 
 
-def _load(controller: str | None) -> Any:
-    """Path of an FMU, or what loads FILE.py afresh for a run and gives its NAME."""
+def _load(controller: str | None, values: Mapping[str, Any]) -> Any:
+    """Path of an FMU, or what loads FILE.py afresh for a run and makes its NAME with values."""
     from percussion_model.coupling import CouplingError
-    from percussion_model.coupling.fresh import fresh
+    from percussion_model.coupling.fresh import fresh, with_values
 
     if controller is None:
         return None
@@ -162,6 +169,6 @@ def _load(controller: str | None) -> Any:
         work: Callable[..., Any] | None = getattr(module, name, None)
         if not callable(work):
             raise CouplingError(f"{file} has no function or class {name}")
-        return fresh(name, work, is_new=True)
+        return fresh(name, with_values(work, values) if values else work, is_new=True)
 
     return anew

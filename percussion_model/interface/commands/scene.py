@@ -102,7 +102,11 @@ def run(
 
 def _by_rock(scene: Scene, is_wanted: bool, asked: str | None) -> RateInterval | None:
     """What the intervals of rock and bit leave of the rate, where they are known."""
-    from percussion_model.analysis.rock_interval import rate_interval, uncertain_numbers
+    from percussion_model.analysis.rock_interval import (
+        NOT_CALIBRATED,
+        rate_interval,
+        uncertain_numbers,
+    )
     from percussion_model.interface.progress import progress
 
     if not (is_wanted and scene["effects.breaking"]):
@@ -112,8 +116,8 @@ def _by_rock(scene: Scene, is_wanted: bool, asked: str | None) -> RateInterval |
             "has other numbers than the rock" if asked else "names no rock of the library (--rock)"
         )
         common.print_message(
-            f"rock and bit leave the rate uncertain, by how much is not known: the scene {why}; "
-            "without a calibration on site the model is no better than a factor 2"
+            f"rock and bit leave the rate uncertain, by how much is not known: the scene {why}. "
+            f"{NOT_CALIBRATED}"
         )
         return None
     text = "sampling the intervals of rock and bit"

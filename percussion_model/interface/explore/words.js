@@ -23,7 +23,7 @@ export const WORDS = {
   noError: "error of the computation: being estimated …",
   errorUnknown: "(numerical error: not estimated here; percussion settled does)",
   rockRange: "{low} to {high} by what is known of rock and bit",
-  rockError: "{rock}. Drills differ further: up to a factor 2 without a calibration on site.",
+  rockError: "{rock}. Real drills differ more: without a calibration on site the rate may be off by a factor of 2 or more.",
   rockMissing: "The interval of the rate by the rock needs a bit that breaks rock: choose one.",
   rockWaiting: "Range by what is known of the rock: {done} of {count} samples …",
   rockOwn: "The rock's numbers were changed, or have no name: no range is known of them.",

@@ -110,9 +110,9 @@ def _panel(ax: Axes, found: Study, key: str) -> None:
         ax.yaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0), numticks=12))
     quantity = QUANTITIES[key]
     unit = {DROP: "the whole drop", APERIODIC: "the run"}.get(found.kind, "one simulated second")
-    kind = "mean difference, by the mean force" if key == HISTORY else "error"
+    kind = "mean difference divided by the mean force" if key == HISTORY else "error"
     if key in HISTORIES and key != HISTORY:
-        kind = "mean difference, by the mean"
+        kind = "mean difference divided by the mean"
     if found.kind == APERIODIC:
         kind = "standard error"
     title = quantity.label[0].upper() + quantity.label[1:]

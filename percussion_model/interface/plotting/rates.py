@@ -15,10 +15,8 @@ from percussion_model.verification.rates.cases import TOP
 from percussion_model.verification.rates.criteria import FACTOR
 from percussion_model.verification.rates.table import HOUR
 
-LEAST, MOST = 5.0, 220.0  # of both axes [m/h]
+LEAST, MOST = 5.0, 220.0  # of measured rates; predicted ones are on a line below the least [m/h]
 TICKS = (5, 10, 20, 50, 100, 200)
-# Where what drills nothing stands, and where its axis ends, below a gap [m/h].
-NOTHING, BOTTOM, GAP = 3.4, 2.8, 4.1
 # From the point to its name, in points.
 LEFT, RIGHT = (-7.0, -3.0), (7.0, -3.0)
 
@@ -27,23 +25,21 @@ def draw_rates(found: Rates) -> Figure:
     """Draw each case with what its rock's numbers leave open, and the factor of the criterion."""
     fig = Figure(figsize=(8.2, 7.6), layout="constrained")
     ax = fig.subplots()
-    ends = np.array([LEAST / FACTOR, MOST * FACTOR])
+    ends = np.geomspace(LEAST / FACTOR, MOST * FACTOR)
     ax.fill_between(ends, ends / FACTOR, ends * FACTOR, color=style.SHADE_COLOUR, linewidth=0)
     ax.plot(ends, ends, color=style.RULE_COLOUR, linewidth=1.0)
     looks = _looks(found)
     for row in found.rows:
         _draw(ax, row, looks[_kind(row)])
-    ax.axhspan(BOTTOM, GAP, facecolor="white", zorder=2)
-    ax.axhline(GAP, color=style.RULE_COLOUR, linewidth=0.8, zorder=2)
     ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set_yscale("symlog", linthresh=LEAST, linscale=0.5)
     ax.set_xlim(LEAST, MOST)
-    ax.set_ylim(BOTTOM, MOST)
+    ax.set_ylim(-0.5, MOST)
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_minor_locator(NullLocator())
     ax.set_xticks(TICKS, [f"{one}" for one in TICKS])
-    ax.set_yticks((NOTHING, *TICKS), ["0", *(f"{one}" for one in TICKS)])
-    ax.text(0.96 * MOST, NOTHING, "nothing breaks", va="center", ha="right", fontsize=8)
+    ax.set_yticks((0, *TICKS), [f"{one}" for one in (0, *TICKS)])
+    ax.text(0.96 * MOST, 0.0, "nothing breaks", va="center", ha="right", fontsize=8)
     style.label(ax, "measured rate [m/h]", "predicted rate [m/h]")
     handles = [
         *(_handle(colour, marker, name) for name, (colour, marker) in looks.items()),
@@ -74,13 +70,19 @@ def _draw(ax: Axes, row: RateRow, look: tuple[str, str]) -> None:
     """One case; those outside the factor have their rock's name."""
     colour, marker = look
     told, x = row.predicted, row.case.rate * HOUR
-    y = told.rate * HOUR if told.rate > 0.0 else NOTHING
-    low = told.low * HOUR if told.low > 0.0 else NOTHING
-    if told.high * HOUR > GAP:
-        ax.plot([x, x], [low, told.high * HOUR], color=colour, linewidth=0.7, zorder=3)
+    y = told.rate * HOUR
+    ax.plot([x, x], [told.low * HOUR, told.high * HOUR], color=colour, linewidth=0.7, zorder=3)
     ax.plot([x], [y], marker, color=colour, markersize=6.5, markeredgecolor="black",
             markeredgewidth=0.5, zorder=5)  # fmt: skip
     if told.rate > 0.0 and not 1.0 / FACTOR <= row.ratio <= FACTOR:
         away, side = (LEFT, "right") if row.ratio > 1.0 else (RIGHT, "left")
-        ax.annotate(f"{row.case.rock}, {row.case.strength / 1e6:.0f} MPa", (x, y), away,
-                    textcoords="offset points", ha=side, fontsize=8)  # fmt: skip
+        ax.annotate(
+            f"{row.case.rock}, {row.case.strength / 1e6:.0f} MPa",
+            (x, y),
+            away,
+            textcoords="offset points",
+            ha=side,
+            fontsize=8,
+            zorder=4,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
+        )

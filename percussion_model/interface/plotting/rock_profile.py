@@ -47,7 +47,7 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     style.label(axes[0], "crushing energy / efficiency [MJ/m³]", "depth [m]", "What the rate shows")
     style.label(axes[1], "strength [MPa]", "", "By the library's relation")
     style.label(axes[2], "rate [m/h]", "", "Log")
-    style.label(axes[3], "by the median [–]", "", "Settings")
+    style.label(axes[3], "divided by the median [–]", "", "Settings")
     axes[0].set_ylim(float(found.depth[-1]), float(found.depth[0]))
     handles = [
         Line2D([], [], color=blue, label="from the log"),

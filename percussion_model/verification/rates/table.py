@@ -63,7 +63,7 @@ def cells(row: RateRow) -> list[str]:
         case.id, f"{case.rock}, {case.site}", f"{case.strength / 1e6:.1f}",
         f"{case.bit * 1e3:.0f}", hammer_text(case), f"{case.rate * HOUR:.1f}",
         rate_text(found.rate, found.numerical_error),
-        f"{found.low * HOUR:.0f} to {found.high * HOUR:.0f}", f"{row.ratio:.2f}",
+        f"{found.low * HOUR:.1f} to {found.high * HOUR:.1f}", f"{row.ratio:.2f}",
     ]  # fmt: skip
 
 
