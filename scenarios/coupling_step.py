@@ -153,9 +153,11 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
 
     from percussion_model.interface.plotting.style import RULE_COLOUR, head, label, save_png
 
-    figure = Figure(figsize=(12.0, 5.0), layout="constrained")
-    axes = figure.subplots(1, 3)
-    for ax, order in zip(axes, ORDERS, strict=False):
+    figure = Figure(figsize=(9.0, 7.6), layout="constrained")
+    panels = figure.subplot_mosaic([[*ORDERS], ["eight", "eight"]])
+    eight = panels["eight"]
+    for order in ORDERS:
+        ax = panels[order]
         rows = [row for row in ones if row.order == order]
         steps = [1e3 * row.step for row in rows]
         for name, (text, _, _) in QUANTITIES.items():
@@ -163,7 +165,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
         guide = np.array([1e-2, 1.0])
         ax.loglog(guide, 0.2 * guide, "k--", linewidth=0.8, label="first order")
         label(ax, "communication step [ms]", "error [%]", f"One blow, {NAMES[order]}")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     shortest = min(eights, key=lambda row: row.step).rate
     for order, dashes in zip(ORDERS, ("-", "--"), strict=True):
         chosen = [row for row in eights if row.order == order]
@@ -172,17 +174,17 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
         shoulder = [100.0 * row.shoulder for row in chosen]
         for values, colour, mark, words in (
             (change, "#0072B2", "o", "change of the rate"),
-            (shoulder, "#D55E00", "s", "energy of the shoulder divided by that of the blows"),
+            (shoulder, "#D55E00", "s", "energy of the shoulder / of the blows"),
         ):
-            axes[2].semilogx(steps, values, color=colour, linestyle=dashes, marker=mark, ms=4,
-                             label=f"{words}, {NAMES[order]}")  # fmt: skip
-    label(axes[2], "communication step [ms]", "share [%]", "Eight blows")
-    axes[2].axhline(0.0, color="k", linewidth=0.6)
-    figure.legend(*axes[2].get_legend_handles_labels(), loc="outside lower right", ncols=1)
-    for ax in axes:
+            eight.semilogx(steps, values, color=colour, linestyle=dashes, marker=mark, ms=4,
+                           label=f"{words}, {NAMES[order]}")  # fmt: skip
+    label(eight, "communication step [ms]", "share [%]", "Eight blows")
+    eight.axhline(0.0, color="k", linewidth=0.6)
+    eight.legend(loc="upper left")
+    for ax in panels.values():
         ax.axvline(1e3 * UNCHANGED, color=RULE_COLOUR, linewidth=1.0, linestyle=":")
-    axes[2].annotate("default", (1e3 * UNCHANGED, 0.5), (4, 0), xycoords=(
-        "data", "axes fraction"), textcoords="offset points", va="top")  # fmt: skip
+    eight.annotate("default", (1e3 * UNCHANGED, 0.06), (4, 0), xycoords=(
+        "data", "axes fraction"), textcoords="offset points", va="bottom")  # fmt: skip
     head(figure, "Error of a coupled run against its communication step")
     return save_png(figure, path, 110)
 

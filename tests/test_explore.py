@@ -8,6 +8,7 @@ import json
 import os
 import random
 
+import numpy as np
 import pytest
 
 from percussion_model.analysis.stationary import settled
@@ -21,7 +22,7 @@ from percussion_model.scene.rocks.breaking import parameters_under
 from percussion_model.scene.scene import Scene
 from percussion_model.scene.typical import hint_of
 from percussion_model.simulation.driller_numbers import driller_text
-from percussion_model.simulation.uncertain import mean_text
+from percussion_model.simulation.uncertain import in_digits, mean_text
 from tests.browser import browser, find_browser, tab
 
 pytest.importorskip("tornado", reason="a browser is driven through tornado")
@@ -151,6 +152,9 @@ def test_numbers_are_those_of_settled(built, tmp_path):
     ):
         found = settled(scene, error_estimate=True)
         summary = found.summary()
+        if scene.effects.rotation:
+            torque = float(np.mean(found.counted["rotation_torque"]))
+            assert row["Torque of the rotation"] == f"{in_digits(torque)} N m", link
         for name, text in row.items():
             if name in NUMBERS:
                 key, factor, unit = NUMBERS[name]

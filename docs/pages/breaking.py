@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
 
 from docs.blocks import Made
 from percussion_model import Scene, simulate
@@ -118,8 +119,8 @@ def spread(rates: list[float]) -> str:
 
 
 def feed_rows() -> Iterator[list[str]]:
-    """A row for each hammer down the hole and rock: rates from recoil to the motor, torques."""
-    for name, (least, most) in FEEDS.items():
+    """A row for each hammer down the hole and rock: rates from recoil to the motor."""
+    for name in FEEDS:
         for found in ROCKS:
             scene, air = on_rock(found, hammer(name)), on_rock(found, with_chambers(name, PRESSURE))
             weight = scene["feed.casing_mass"] * scene.gravity.acceleration
@@ -139,6 +140,17 @@ def feed_rows() -> Iterator[list[str]]:
                 f"{1e-3 * first_air:.1f} to {1e-3 * last_air:.1f}",
                 f"{np.mean(rates_air):.1f}",
                 spread(rates_air),
+            ]
+
+
+def torque_rows() -> Iterator[list[str]]:
+    """A row for each hammer down the hole and rock: torques at feeds of makers."""
+    for name, (least, most) in FEEDS.items():
+        for found in ROCKS:
+            scene = on_rock(found, hammer(name))
+            yield [
+                name,
+                found,
                 torques_on_air(name, found, (least, 0.5 * (least + most), most)),
                 torques([scene], least, most),
                 torques([scene.replace(**string(scene, one)) for one in LENGTHS], least, most),
@@ -176,16 +188,17 @@ def torques(scenes: list[Scene], least: float, most: float) -> str:
 
 
 FEED_HEADINGS = (
-    "hammer", "rock", "feed, recoil to 0.8 of the motor, kN", "mean m/h", "least / most, %",
-    "m/h at six times the first", "with chambers of air at 24 bar: feed, kN", "mean m/h",
-    "least / most, %",
-    "torque with chambers, N m, at makers' least feed and 10 bar, middle and 12.5, greatest and 15",
-    "torque, N m, at makers' least feed with 0.6 of the drive, with all of it, own, greatest feed",
-    "the same with strings of 5 to 80 m that twist, mean",
+    "hammer", "rock", "feed, kN", "mean m/h", "least / most, %", "m/h at six times the first",
+    "on air: feed, kN", "mean m/h", "least / most, %",
+)  # fmt: skip
+TORQUE_HEADINGS = (
+    "hammer", "rock", "on air, N m: least, middle, greatest feed",
+    "by the pressure law, N m: least with 0.6 of the drive, least, own, greatest feed",
+    "the same with strings that twist, N m",
 )  # fmt: skip
 HEADINGS = (
     "hammer", "rock", "m/h", "blow, J", "MJ/m³", "gauge index, mm", "torque, N m", "K ± 5 %, %",
-    "recoil by least feed",
+    "recoil / least feed",
 )  # fmt: skip
 
 
@@ -230,6 +243,7 @@ def draw_rotation(axes: Axes, rows: list[dict[str, float]]) -> None:
     axes.axvspan(*np.interp(INDEX, index, rpm), color="0.9", zorder=0)
     (rate,) = axes.plot(rpm, [row["rate"] for row in rows], "o-", ms=3, color="#0072B2")
     axes.set(xscale="log", xlabel="rotation [rpm]", ylabel="rate of penetration [m/h]")
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.set_ylim(bottom=0.0)
     other = axes.twinx()
     other.spines["right"].set_visible(True)
@@ -268,5 +282,6 @@ def made() -> Made:
     blocks = {
         "presets": lambda: table(HEADINGS, preset_rows()),
         "feeds": lambda: table(FEED_HEADINGS, feed_rows()),
+        "torques": lambda: table(TORQUE_HEADINGS, torque_rows()),
     }
     return Made(("breaking.md",), blocks, figures=draw, dpi=110)

@@ -155,7 +155,7 @@ def limit_note(limited: float, volume: float) -> Iterator[str]:
     if limited > MOST_LIMITED * (limited + volume):
         share = 100.0 * limited / (limited + volume)
         yield (
-            f"{share:.2g} % of the volume broken is not gained: flushing limits it, or more would "
+            f"{share:.3g} % of the volume broken is not gained: flushing limits it, or more would "
             "break than the buttons press in, and breaking.crushing_energy is too small"
         )
 

@@ -227,7 +227,7 @@ def _notes() -> dict[str, Any]:
         "texts": {
             "button": only(validity.button_note(one, 1.0)),
             "rate": only(validity.rate_note(one)),
-            "limit": only(validity.limit_note(one, 0.0)).replace("1e+02 %", "{0:.2g} %"),
+            "limit": only(validity.limit_note(one, 0.0)).replace("100 %", "{0:.3g} %"),
             "jam": only(validity.jam_note(much, Fact(1, 1.0))),
             "lifted": only(validity.recoil_note(1e9, one, True)),
             "recoil": only(validity.recoil_note(1e9, one, False)),

@@ -65,6 +65,7 @@ export class Drawing {
     this.drawButtons(pen, bitEnd);
     this.drawBar(pen, 0, pistonEnd - this.lengths[0] * this.k, t);
     if (value("contact_force") > 0) this.flash(pen, struck, value("contact_force") / (blow.greatest.contact_force || 1));
+    this.drawNames(pen, pistonEnd, struck, bitEnd);
     this.drawChips(pen, t);
     this.drawArrows(pen, pistonEnd - this.lengths[0] * this.k, value("drive_force"));
     this.drawScale(pen);
@@ -94,6 +95,17 @@ export class Drawing {
       pen.fillStyle = `rgb(${stressColour(field.stress[k * cells + cell] / this.blow.greatest.stress)})`;
       pen.fillRect(this.middle - half, y + (low - from) * this.k, 2 * half, (high - low) * this.k + 0.6);
     }
+  }
+
+  // Names beside the bars, at the middle of each.
+  drawNames(pen, pistonEnd, struck, bitEnd) {
+    const [piston, ...below] = this.lengths.map(one => one * this.k), bit = below.at(-1), [own, rods, last] = WORDS.bars;
+    const x = this.middle - Math.sqrt(Math.max(...this.bars.flat().map(one => one[1])) / Math.PI) * this.r - 0.6 * this.font;
+    pen.fillStyle = this.ink.soft;
+    pen.textAlign = "right";
+    pen.fillText(own, x, pistonEnd - 0.5 * piston);
+    if (below.length > 1) pen.fillText(rods, x, 0.5 * (struck + bitEnd - bit));
+    pen.fillText(last, x, Math.min(bitEnd - 0.5 * bit, this.floor - 0.16 * this.height - 0.5 * this.font));
   }
 
   // Where buttons are, from the middle.
@@ -211,7 +223,7 @@ export class Drawing {
     }
     pen.fillStyle = this.ink.ink;
     pen.textAlign = "left";
-    if (this.blow.fields.length) pen.fillText(`${WORDS.tension} ← ${short(most, 2)} ${unit} → ${WORDS.compression}`, left, y + 1.75 * this.font);
+    if (this.blow.fields.length) pen.fillText(`${WORDS.tension} – ${WORDS.compression}: ± ${short(most, 2)} ${unit}`, left, y + 1.75 * this.font);
     pen.textAlign = "right";
     pen.fillText(fill(WORDS.magnified, { n: MAGNIFIED }), this.width - 0.5 * this.font, y + 0.6 * this.font);
   }

@@ -17,6 +17,8 @@ const STAGE = location.search === "?stage";
 const START = { hammer: "dth4", bit: "dth-115", rock: "kuru-granite" };
 // A slower advance is rounding [m/s].
 const LEAST_RATE = 1e-12;
+// A bit that turns by less between blows stands still [m].
+const STILL = 1e-7;
 // Points of a curve, time that a wish may take [ms], and how long the address waits [ms].
 const POINTS = 13, MOST_TIME = 8000, ADDRESS_WAITS = 400;
 // Points of a curve are known to this share, and progress is told so often [ms].
@@ -155,8 +157,8 @@ function showRate(id, found) {
   const { scene } = state, waits = intervalOf(scene), counted = judge.counted(found), values = found.kind === "stalled" || !counted.length ? {} : judge.values(counted);
   const rate = found.rate ?? values[RATE];
   state.found = {
-    ...found, rate: Math.abs(rate) < LEAST_RATE ? 0 : rate, counted, means: addVolume(values), rock: scene.get("effects.rock"), stiffness: scene.get("rock.loading_stiffness") * scene.get("rock.buttons"),
-    undamped: !scene.get("effects.loss") || scene.get("loss.time") === 0,
+    ...found, rate: Math.abs(rate) < LEAST_RATE ? 0 : rate, counted, means: addVolume(addTorque(values, counted)), rock: scene.get("effects.rock"), stiffness: scene.get("rock.loading_stiffness") * scene.get("rock.buttons"),
+    still: scene.get("effects.rotation") && counted.every(one => one.rotation_index < STILL), undamped: !scene.get("effects.loss") || scene.get("loss.time") === 0,
     notes: unusual(scene, tables.notes), interval: waits ? fill(WORDS.rockWaiting, { done: 0, count: waits.samples.length }) : scene.get("effects.breaking") ? WORDS.rockOwn : WORDS.rockMissing,
   };
   Object.assign(state, { shown: id, took: performance.now() - state.began });
@@ -231,6 +233,11 @@ function curveOf(scene, key) {
   const of = JSON.stringify([scene.hammer, scene.bit, scene.rock, others, low, high]), before = state.curves[key];
   if (before?.of === of) return before;
   return { of, scene, low, high, places: Array.from({ length: POINTS }, (_, k) => low + k / (POINTS - 1) * (high - low)), points: [] };
+}
+
+function addTorque(numbers, blows) {
+  if (blows.length && state.scene.get("effects.rotation")) numbers.rotation_torque = blows.reduce((sum, one) => sum + one.rotation_torque, 0) / blows.length;
+  return numbers;
 }
 
 // Specific energy beside the energy by advance, where the hole is known.

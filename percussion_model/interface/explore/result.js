@@ -12,7 +12,7 @@ export function motionWords(found) {
   const { kind, order, counted } = found;
   const said = kind === "periodic" ? (order === 1 ? WORDS.kinds.once : fill(WORDS.kinds.cycle, { n: order }))
     : fill(WORDS.kinds[kind], { n: counted.length });
-  const more = (found.rate === 0 ? WORDS.nothing[found.rock] ?? WORDS.nothing.bilinear : "") + (found.undamped ? WORDS.undamped : "");
+  const more = (found.rate === 0 ? WORDS.nothing[found.still ? "still" : found.rock] ?? WORDS.nothing.bilinear : "") + (found.undamped ? WORDS.undamped : "");
   return said + more + (found.same === true ? WORDS.sameMotion : found.same === false ? WORDS.otherMotion : "");
 }
 
@@ -35,7 +35,9 @@ export function numberTexts(found, imperial) {
     const value = found.means?.[key];
     if (!Number.isFinite(value) || found.rock === "none" || (key === "specific_energy" && (found.undamped || found.rate === 0))) continue;
     const [unit, factor] = unitOf(kind, imperial);
-    shown.push([name, `${meanText(Math.abs(value) < NOTHING ? 0 : value, found.errors?.[key], factor)} ${unit}`]);
+    const text = key === "rotation_torque" ? inDigits(factor * value) // its error is not estimated
+      : meanText(Math.abs(value) < NOTHING ? 0 : value, found.errors?.[key], factor);
+    shown.push([name, `${text} ${unit}`]);
   }
   return shown;
 }
@@ -71,7 +73,7 @@ function whyWords(found, pinned, imperial) {
   };
   if (!found.rate || found.undamped) return "";
   const own = parts(found), [unit, factor] = unitOf("length", imperial), blow = own.blow * own.share * own.depth;
-  const said = fill(WORDS.energyOf, { blow: inDigits(own.blow), share: inDigits(100 * own.share), advance: inDigits(factor * blow), unit });
+  const said = fill(own.share > 1 ? WORDS.energyOfFeed : WORDS.energyOf, { blow: inDigits(own.blow), share: inDigits(100 * own.share), advance: inDigits(factor * blow), unit });
   if (!pinned?.rate || pinned.undamped) return said;
   const before = parts(pinned), shares = Object.fromEntries(Object.keys(own).map(name => [name, inDigits(own[name] / before[name])]));
   return `${said} ${fill(WORDS.against, shares)}${found.stiffness > pinned.stiffness ? WORDS.softer : ""}`;

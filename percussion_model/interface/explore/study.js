@@ -2,7 +2,7 @@
 import { inDigits, short } from "./numbers.js";
 import { Plot, shareOf, tickText } from "./plot.js";
 
-const ROW = 26, ROOM = 40, FEW = 6, MOST_LINES = 9, WIDE = 10, COUNT = 0, GIVEN = 5, KNOWN = 3;
+const ROW = 26, ROOM = 40, FEW = 6, MOST_LINES = 9, WIDE = 10, COUNT = 0, GIVEN = 5, KNOWN = 3, PALE = 0.6;
 const VIRIDIS = ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"];
 
 const study = JSON.parse(document.getElementById("study-data").textContent);
@@ -25,7 +25,7 @@ function shown(value, digits) {
 }
 
 const isHidden = (name, k) => study.hideable.includes(name) && study.undecided[k] === 1;
-const ofPoint = (name, k) => `shown ${shown(columns[name][k], quantity(name).digits)}; rate ${study.rates[k]} mm/s; ${study.motions[k]}`;
+const ofPoint = (name, k) => `shown ${shown(columns[name][k], quantity(name).digits)}; rate ${study.rates[k]} m/h; ${study.motions[k]}`;
 
 function made(tag, parent, values = {}) {
   const one = Object.assign(document.createElement(tag), values);
@@ -90,7 +90,7 @@ function map(box) {
   let range = all, cells = [];
   const rows = [...new Set(Array.from({ length: Math.min(y.values.length, MOST_LINES) }, (_, k, n = Math.min(y.values.length, MOST_LINES)) => Math.round(k / Math.max(n - 1, 1) * (y.values.length - 1))))];
   function draw() {
-    const name = select.value, base = sliders.reduce((sum, one) => sum + one(), 0), { title, digits } = quantity(name);
+    const name = select.value, base = sliders.reduce((sum, one) => sum + one(), 0), { title, digits, unit } = quantity(name);
     cells = y.values.flatMap((_, j) => x.values.map((_, i) => base + j * y.stride + i * x.stride));
     const values = cells.map(k => isHidden(name, k) ? NaN : columns[name][k]), [low, high] = limits(values);
     // a map over more than a decade would be of one colour
@@ -102,7 +102,7 @@ function map(box) {
     rows.forEach((row, k) => right.plot.line(x.values.map((at, i) => [at, values[row * x.values.length + i]]), viridis(0.92 * k / Math.max(rows.length - 1, 1)), 2));
     right.plot.frame();
     const undecided = values.some((_, j) => isHidden(name, cells[j]));
-    key.innerHTML = `<span>${shown(low, digits)}</span><i></i><span>${shown(high, digits)}${steps ? ", by ratios" : ""}</span>${undecided ? `<b>hatched: ${study.word}, error ≥ rate</b>` : ""}`;
+    key.innerHTML = `<span>${shown(low, digits)}</span><i></i><span>${shown(high, digits)} ${unit}${steps ? ", logarithmic" : ""}</span>${undecided ? `<b>hatched: ${study.word}, error ≥ rate</b>` : ""}`;
   }
   function drawCells(name, values, share) {
     const { plot } = left, pen = plot.begin(...range, x.label, y.label, logs);
@@ -113,13 +113,16 @@ function map(box) {
     values.forEach((value, at) => {
       const i = at % x.values.length, j = Math.floor(at / x.values.length);
       const [a, b, c, d] = [plot.px(x.edges[i]), plot.px(x.edges[i + 1]), plot.py(y.edges[j]), plot.py(y.edges[j + 1])];
+      const isLight = !Number.isFinite(value) || share(value) > PALE;
       pen.fillStyle = Number.isFinite(value) ? viridis(share(value)) : isHidden(name, cells[at]) ? "#eeeeee" : "#dddddd";
       pen.fillRect(a, d, b - a + 0.5, c - d + 0.5);
       pen.lineWidth = 1.5;
       const line = (colour, ...ends) => { pen.strokeStyle = colour; pen.beginPath(); ends.forEach(end => pen.lineTo(...end)); pen.stroke(); };
       if (isHidden(name, cells[at])) for (let u = a; u < b; u += 8) line("#666666", [u, c], [Math.min(u + (c - d), b), Math.max(d, c - (b - u))]);
       const [u, v] = [plot.px(x.values[i]), plot.py(y.values[j])];
-      if (study.motions[cells[at]] !== "periodic") { line("#ffffff", [u - 4, v - 4], [u + 4, v + 4]); line("#ffffff", [u - 4, v + 4], [u + 4, v - 4]); }
+      if (study.motions[cells[at]] !== "periodic") {
+        for (const rise of [-4, 4]) line(isLight ? "#000000" : "#ffffff", [u - 4, v - rise], [u + 4, v + rise]);
+      }
     });
     pen.restore();
     plot.frame();

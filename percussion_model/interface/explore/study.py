@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from percussion_model.analysis.study import Study
+from percussion_model.analysis.study import PER_HOUR, Study
 from percussion_model.analysis.study.response import KINDS
 from percussion_model.interface.explore.build import as_json, joined, packed, source
 from percussion_model.interface.plotting import style
@@ -24,8 +24,11 @@ KIND_COLOURS = dict(
 EVEN = 1e-6
 # What can be shown: column of the page, name, unit, column of a study, factor from SI.
 QUANTITIES = (
-    ("rate", "Rate of penetration", "mm/s", "rate_of_penetration", 1e3),
-    ("off", "Standard error (scatter) or convergence", "mm/s", "rate_of_penetration_error", 1e3),
+    ("rate", "Rate of penetration", PER_HOUR.unit, "rate_of_penetration", PER_HOUR.factor),
+    (
+        "off", "Standard error (scatter) or convergence", PER_HOUR.unit,
+        "rate_of_penetration_error", PER_HOUR.factor,
+    ),
     ("error", "The same, relative to the rate", "–", "", 1.0),
     ("period", "Blow period", "ms", "blow_period", 1e3),
     ("impact", "Impact velocity", "m/s", "impact_velocity", 1.0),
@@ -38,7 +41,7 @@ QUANTITIES = (
     ("contacts", "Contacts per blow", "–", "contacts_per_blow", 1.0),
     ("cycles", "Drilling cycles per blow", "–", "drilling_cycles_per_blow", 1.0),
     ("order", "Blows of a cycle", "–", "order", 1.0),
-)
+)  # fmt: skip
 # Digits of an error, and the sign for counts, which are whole or a mean.
 OF_ERRORS, COUNT = 2, 0
 # Digits of all: the errors of the grids are not known.
@@ -65,13 +68,19 @@ def script(found: Study) -> Markup:
 
 def data(found: Study) -> dict[str, Any]:
     """What the report carries of each point, and how it is called."""
-    kept, points, titles = np.arange(len(found.points)), found.points, _titles()
+    kept, points = np.arange(len(found.points)), found.points
     if not points.is_grid:
         kept = np.unique(np.linspace(0, len(kept) - 1, min(len(kept), MOST_SHOWN)).astype(int))
     labels = {key: _label(key, found.scene.row_of(key).unit) for key in points.keys}
     return {
         "quantities": [
-            {"name": name, "title": title, "digits": DIGITS[name]} for name, title in titles.items()
+            {
+                "name": name,
+                "title": f"{words} [{unit}]",
+                "unit": unit.strip("–"),
+                "digits": DIGITS[name],
+            }
+            for name, words, unit, _, _ in QUANTITIES
         ],
         "columns": {name: packed(values[kept]) for name, values in _columns(found).items()},
         "keys": [
@@ -105,15 +114,16 @@ def _motions(found: Study, kept: np.ndarray) -> list[str]:
 
 
 def _rates(found: Study, kept: np.ndarray) -> list[str]:
-    """Rates [mm/s] as text, with what is known of their errors."""
-    rates, of_cells = 1e3 * found.rows["rate_of_penetration"], found.depends_on_cells
+    """Rates [m/h] as text, with what is known of their errors."""
+    rates = PER_HOUR.factor * found.rows["rate_of_penetration"]
+    of_cells = found.depends_on_cells
     known = np.isfinite(rates)
     return [
         "–"
         if not known[k]
         else of_the_cells(float(rates[k]))
         if of_cells[k] and rates[k]
-        else found.rate_text(k, "")
+        else found.rate_text(k, "", PER_HOUR.factor)
         for k in kept.tolist()
     ]
 
@@ -121,11 +131,6 @@ def _rates(found: Study, kept: np.ndarray) -> list[str]:
 def _label(key: str, unit: str) -> str:
     """Key and unit of a parameter."""
     return f"{key} [{unit}]".replace("[-]", "[–]").replace("^2", "²").replace("^3", "³")
-
-
-def _titles() -> dict[str, str]:
-    """Name and unit of each quantity."""
-    return {name: f"{words} [{unit}]" for name, words, unit, _, _ in QUANTITIES}
 
 
 @dataclass(frozen=True)

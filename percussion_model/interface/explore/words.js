@@ -12,6 +12,7 @@ export const WORDS = {
     bilinear: " Nothing breaks: the blows are too weak, or the feed does not hold the bit on the rock.",
     spring: " A spring gives all back: nothing breaks.",
     wall: " Nothing breaks a rigid wall.",
+    still: " Nothing breaks: the bit does not turn, so its buttons meet crushed rock alone.",
     none: " Without rock nothing stops the bit, which runs away: there is no steady motion.",
   },
   undamped: " Without loss in the steel the rate depends on the resolution: it is undecided.",
@@ -29,6 +30,7 @@ export const WORDS = {
   rockOwn: "The rock's numbers were changed, or have no name: no range is known of them.",
   pinned: "Pinned, in grey: {rate}. {name}.",
   energyOf: "Each blow carries {blow} J; {share} % of it goes into the rock, and the hole advances {advance} {unit} for it.",
+  energyOfFeed: "Each blow carries {blow} J. The feed does so much work besides that the rock takes {share} % of that, and the hole advances {advance} {unit} for it.",
   against: "Why another rate than pinned: blows per second × {frequency}, energy of a blow × {blow}, share into the rock × {share}, advance for the same energy in the rock × {depth}.",
   softer: " A stiffer rock is pressed in less by the same energy.",
   values: "{rock} {unit} on the rock, {piston} {unit} on the bit, {depth} {mm} deep",
@@ -53,7 +55,7 @@ export const WORDS = {
   about: "percussion_model {version}. Piston and bit are elastic bars, the rock follows a law with memory. All is computed on this machine; nothing is sent.",
   computing: "computing …",
   compression: "compression", tension: "tension",
-  drive: "drive", feed: "feed",
+  drive: "drive", feed: "feed", bars: ["piston", "rods", "bit"],
   magnified: "bit motion × {n}",
 };
 
@@ -64,7 +66,7 @@ export const SLIDERS = [
   { key: "pneumatic.supply_pressure", name: "Air pressure", unit: "pressure", low: 4e5, high: 35e5 },
   { key: "hydraulic.supply_pressure", name: "Oil pressure", unit: "pressure", low: 60e5, high: 250e5 },
   { key: "drive.reversal_distance", name: "Stroke: where the drive turns", unit: "length", low: 0.005, high: 0.1 },
-  { key: "rotation.speed", name: "Rotation", unit: "turns", low: 0, high: 15.7 },
+  { key: "rotation.speed", name: "Rotation", unit: "turns", low: 0, high: 26.2 },
 ];
 export const OTHERS = [
   { key: "rock.loading_stiffness", name: "Rock stiffness, loading", unit: "stiffness", low: 1e8, high: 3e9 },
@@ -73,6 +75,7 @@ export const OTHERS = [
   { key: "breaking.crushing_energy", name: "Crushing energy", unit: "specific", low: 10e6, high: 150e6 },
   { key: "loss.time", name: "Loss time of steel", unit: "microseconds", low: 5e-8, high: 2e-6 },
   { key: "drive.external_force", name: "Given force on the piston", unit: "force", low: -20e3, high: 20e3 },
+  { key: "rotation.stall_torque", name: "Torque at which the rotation stalls (0: never)", unit: "torque", low: 0, high: 3000 },
   { key: "feed.casing_mass", name: "Mass of the casing", unit: "mass", low: 0, high: 300 },
 ];
 
@@ -104,6 +107,7 @@ export const NUMBERS = [
   ["percussive_power", "Percussive power", "power"],
   ["specific_energy", "Specific energy", "specific"],
   ["blow_period", "Blow period", "milliseconds"],
+  ["rotation_torque", "Torque of the rotation", "torque"],
 ];
 
 // Kinds of unit: [unit, factor from SI] metric and imperial.
@@ -124,6 +128,7 @@ export const UNITS = {
   microseconds: same("µs", 1e6), milliseconds: same("ms", 1e3),
   mass: [["kg", 1], ["lb", 1 / 0.45359237]],
   frequency: same("Hz", 1),
+  torque: [["N m", 1], ["lbf·ft", 1 / 1.3558179483314]],
   speed: [["m/s", 1], ["ft/s", 1 / 0.3048]],
   share: same("%", 100),
   power: [["kW", 1e-3], ["hp", 1 / 745.69987158227]],
