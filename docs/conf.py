@@ -72,6 +72,17 @@ def set_aside(app: Sphinx, page: nodes.document) -> None:
         app.env.metadata[app.env.docname].update({"orphan": "", "nosearch": ""})
 
 
+def link_figures(app: Sphinx, page: nodes.document, name: str) -> None:
+    """Let a click on a figure open it in full: pages are narrower than some."""
+    for image in list(page.findall(nodes.image)):
+        within = isinstance(image.parent, nodes.reference) or image["uri"].startswith("data:")
+        if not within:
+            file = f"{'../' * name.count('/')}{app.builder.imagedir}/{Path(image['uri']).name}"
+            link = nodes.reference("", "", refuri=file)
+            image.replace_self(link)
+            link += image
+
+
 def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
     """Let links to files beside docs/ lead to their pages."""
     up = "../" * name.count("/")
@@ -83,3 +94,4 @@ def setup(app: Sphinx) -> None:
     """Connect what Sphinx calls."""
     app.connect("source-read", link_pages)
     app.connect("doctree-read", set_aside)
+    app.connect("doctree-resolved", link_figures)

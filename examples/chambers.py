@@ -83,7 +83,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     share = efficiency(rows, np.repeat(pressure[:, np.newaxis], len(edge), axis=1))
     loops = diagrams()
     tuned = {air: at_air(air, pressure, rows) for air in COMPRESSORS}
-    with figure_of(NAME, out, (12.0, 4.6)) as fig:
+    with figure_of(NAME, out, (10.2, 5.0)) as fig:
         cells = fig.add_gridspec(2, 3, width_ratios=(0.9, 1.25, 1.1))
         for k, (name, loop) in enumerate(loops.items()):
             _draw_loop(fig.add_subplot(cells[k, 0]), name, loop)

@@ -97,8 +97,8 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
     errors = {name: found.rate_of_penetration_error for name, found in motions.items()}
     shown = {k: in_few_characters(1e3 * rates[k], 1e3 * errors[k], 1e-3) for k in rates}
     stress = {name: contact_stress(scene) for name, scene in designs.items()}
-    with figure_of(NAME, Path(out), (12.0, 4.6)) as fig:
-        left, middle, right = fig.subplots(1, 3, width_ratios=(1.25, 1.2, 0.9))
+    with figure_of(NAME, Path(out), (10.2, 5.0)) as fig:
+        left, middle, right = fig.subplots(1, 3, width_ratios=(1.15, 1.15, 1.0))
         _draw_lengths(left, ratio, rock)
         mesh = middle.pcolormesh(share, areas, 100 * steps, cmap="viridis", shading="nearest")
         fig.colorbar(mesh, ax=middle, label="energy in the rock [%]")
@@ -145,7 +145,7 @@ def _draw_designs(
     ax.set_xlim(0.0, 100.0)
     ax.set_ylim(len(blows) - 0.5, -0.9)
     ax.legend(loc="upper center", ncols=3, columnspacing=1.0)
-    style.label(ax, "energy of the blow [%]", "", "Designs, settled rate, stress")
+    style.label(ax, "energy of the blow [%]", "", "Designs: rate, stress")
 
 
 if __name__ == "__main__":

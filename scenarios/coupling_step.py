@@ -183,7 +183,7 @@ def draw(ones: Sequence[OneBlow], exact: OneBlow, eights: Sequence[EightBlows], 
     eight.legend(loc="upper left")
     for ax in panels.values():
         ax.axvline(1e3 * UNCHANGED, color=RULE_COLOUR, linewidth=1.0, linestyle=":")
-    eight.annotate("default", (1e3 * UNCHANGED, 0.06), (4, 0), xycoords=(
+    eight.annotate("default", (1e3 * UNCHANGED, 0.4), (4, 0), xycoords=(
         "data", "axes fraction"), textcoords="offset points", va="bottom")  # fmt: skip
     head(figure, "Error of a coupled run against its communication step")
     return save_png(figure, path, 110)

@@ -64,7 +64,7 @@ def draw_house() -> Figure:
     """Draw layers, neighbours and the way of a run."""
     rows = layers()
     bottom = 1.0 + len(rows) * (ROW + GAP)
-    fig = Figure(figsize=(12.0, 0.66 * (bottom + 0.4)), layout="constrained")
+    fig = Figure(figsize=(10.6, 0.62 * (bottom + 0.4)), layout="constrained")
     ax = fig.subplots()
     blank(ax, WIDTH, bottom + 0.4)
     box(ax, (0.05, 0.1), (WAY_AT + WAY_WIDTH + 0.15, bottom + 0.1), "white", INK)

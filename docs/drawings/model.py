@@ -39,7 +39,7 @@ ENDS = {
 
 def draw_model(scene: Scene) -> Figure:
     """Draw the parts with their symbols, and beside them both laws of a scene."""
-    fig = Figure(figsize=(12.0, 8.0), layout="constrained")
+    fig = Figure(figsize=(11.2, 8.0), layout="constrained")
     left, right = fig.subfigures(1, 2, width_ratios=(1.0, 1.12))
     _sketch(left.subplots())
     drive, rock, modes = right.subplots(3, 1, height_ratios=(1.0, 1.75, 0.95))

@@ -93,7 +93,7 @@ def draw_waves(scene: Scene) -> Figure:
     """Draw an impact over time and depth, and the errors of modes and steps."""
     scene = stepped(scene)
     found = impact_of(scene)
-    fig = Figure(figsize=(12.0, 8.4), layout="constrained")
+    fig = Figure(figsize=(10.6, 8.2), layout="constrained")
     grid = fig.add_gridspec(3, 2, width_ratios=(1.75, 1.0), height_ratios=(2.4, 2.0, 1.15))
     left = grid[:2, 0].subgridspec(2, 1, height_ratios=(5.6, 1.0), hspace=0.02)
     above = fig.add_subplot(left[0])

@@ -122,7 +122,7 @@ LAW = Law(
 _LAYER = {
     "top": ("m", -1.0, 2e4, "depth at which the layer begins (-1: no such layer)"),
     "loading_stiffness": ("N/m", 1e3, 1e13, "loading stiffness K_R"),
-    "unloading_ratio": ("1", 1.0, 1e4, "gamma: unloading by loading stiffness"),
+    "unloading_ratio": ("1", 1.0, 1e4, "gamma: ratio of unloading to loading stiffness"),
     "torque_factor": ("1", 0.0, 100.0, "torque on the rotation, divided by that of sound rock"),
     "crushing_energy": ("J/m^3", 0.0, 1e12, "e_c, for a hammer with effects.breaking"),
 }

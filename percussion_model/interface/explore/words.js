@@ -70,7 +70,7 @@ export const SLIDERS = [
 ];
 export const OTHERS = [
   { key: "rock.loading_stiffness", name: "Rock stiffness, loading", unit: "stiffness", low: 1e8, high: 3e9 },
-  { key: "rock.unloading_ratio", name: "Unloading by loading stiffness", unit: "ratio", low: 1.1, high: 20 },
+  { key: "rock.unloading_ratio", name: "Ratio of unloading to loading stiffness", unit: "ratio", low: 1.1, high: 20 },
   { key: "rock.barrier_energy", name: "Energy barrier", unit: "energy", low: 0, high: 0.5 },
   { key: "breaking.crushing_energy", name: "Crushing energy", unit: "specific", low: 10e6, high: 150e6 },
   { key: "loss.time", name: "Loss time of steel", unit: "microseconds", low: 5e-8, high: 2e-6 },

@@ -52,7 +52,7 @@ FEW_DECADES = 100.0
 def draw_accuracy(found: Study) -> Figure:
     """Draw the first quantity and the force on the rock against time."""
     keys = [found.main] + [HISTORY] * (HISTORY in found.quantities)
-    fig = Figure(figsize=(11.0 if len(keys) > 1 else 8.0, 5.6), layout="constrained")
+    fig = Figure(figsize=(9.6 if len(keys) > 1 else 8.0, 5.6), layout="constrained")
     for ax, key in zip(np.atleast_1d(fig.subplots(1, len(keys))), keys, strict=True):
         _panel(ax, found, key)
     _head(fig, _title(found), found)

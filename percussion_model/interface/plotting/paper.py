@@ -46,7 +46,7 @@ RIGID_COLOUR = "#009E73"
 
 def draw_drops(drops: Sequence[Drop]) -> Figure:
     """Draw the drop tests: mean bit motion, and where the bit comes to rest (figure 6)."""
-    fig = Figure(figsize=(13.0, 4.6), layout="constrained")
+    fig = Figure(figsize=(10.4, 4.4), layout="constrained")
     motion, close, rest = fig.subplots(1, 3)
     for drop in drops:
         shown = drop.time <= DROP_SHOWN
@@ -70,7 +70,7 @@ def draw_drops(drops: Sequence[Drop]) -> Figure:
         rest,
         "energy barrier $W_R$ [J]",
         "bit end at rest, down [mm]",
-        "(c) Penetration when the bit has come to rest",
+        "(c) Penetration at rest",
     )
     handles = [
         Line2D([], [], color=colour, linewidth=2.0, label=f"$W_R$ = {energy:g} J")
@@ -195,7 +195,8 @@ def _ratio(ax: Axes, found: Mapping[str, Study]) -> None:
     ax.set_xscale("log")
     ax.axvline(40.0, color=style.RULE_COLOUR, linestyle=":")
     _say_left(ax, 40.0, "paper: greatest rate")
-    style.label(ax, "unloading by loading stiffness $\\gamma$ [-]", RATE, "(b) Unloading stiffness")
+    ratio = "ratio of unloading to loading stiffness $\\gamma$ [-]"
+    style.label(ax, ratio, RATE, "(b) Unloading stiffness")
 
 
 def _feed(ax: Axes, found: Study) -> None:
