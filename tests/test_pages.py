@@ -116,7 +116,7 @@ def test_a_map_shows_the_slice_and_the_quantity_that_are_chosen(found, tmp_path)
     )
     rows = found.rows.reshape(found.points.shape)
     # row by row from the softest rock on, as the map is drawn
-    assert rates == pytest.approx(1e3 * rows["rate_of_penetration"][:, :, 1].T.ravel(), rel=1e-6)
+    assert rates == pytest.approx(3600.0 * rows["rate_of_penetration"][:, :, 1].T.ravel(), rel=1e-6)
     assert impacts == pytest.approx(rows["impact_velocity"][:, :, 0].T.ravel(), rel=1e-6)
     assert title == "Impact velocity [m/s]"
 
@@ -143,12 +143,12 @@ def test_a_study_shows_three_digits_and_two_of_an_error(tmp_path):
         "study.rates", *["document.querySelectorAll('.points button')[4].click()", DRAWN_ROWS] * 2,
     )  # fmt: skip
     assert first[:2] == ["2636.4", "0.002"]
-    assert first[4:7] == ["16.2", "1.8e-08", "1.1e-09"]
-    assert second[4:7] == ["17.4", "0.43", "0.025"]
+    assert first[4:7] == ["58.4", "6.5e-08", "1.1e-09"]
+    assert second[4:7] == ["62.8", "1.6", "0.025"]
     assert shown == ["16.2", "1.8e-08", "3"]
-    assert rates[0] == "16.2"
-    assert "17.43 ± 0.43" in rates
-    assert "Standard error (scatter) or convergence [mm/s]" in names
+    assert rates[0] == "58.4"
+    assert "62.8 ± 1.6" in rates
+    assert "Standard error (scatter) or convergence [m/h]" in names
     sizes = sorted(float(text) for text in (least[4], most[4]))
     assert [float(least[4]), float(most[4])] == sizes
     assert sizes[0] < sizes[1]
@@ -186,7 +186,7 @@ def test_samples_are_scattered_over_each_parameter(tmp_path):
     )  # fmt: skip
     assert count > 10
     assert panels == 2
-    assert bars == pytest.approx(1e3 * found.rows["rate_of_penetration_error"][[0, 2]], rel=1e-5)
+    assert bars == pytest.approx(3600.0 * found.rows["rate_of_penetration_error"][[0, 2]], rel=1e-5)
 
 
 def test_a_large_study_makes_a_page_of_some_megabytes():

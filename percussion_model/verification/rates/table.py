@@ -145,7 +145,7 @@ def all_cases(found: Rates) -> Iterator[str]:
 
 def other_rates(found: Rates) -> Iterator[str]:
     """Lines of what is no case, and of what could not be read."""
-    headings = ("rate", "kind", "hammer", "bit", "rock", "told", "lacks")
+    headings = ("rate", "kind", "hammer", "bit", "rock", "stated", "lacks")
     keys = ("id", "kind", "hammer", "bit", "rock", "rate", "lacks")
     yield _table(headings, [[row[key] for key in keys] for row in found.stored.unused])
     yield "## Wanted"
@@ -157,6 +157,6 @@ def other_rates(found: Rates) -> Iterator[str]:
 
 def _table(headings: tuple[str, ...], rows: list[list[str]]) -> str:
     """A table, and the empty line below it."""
-    left = (*OF_WORDS, "rate", "kind", "bit", "told", "lacks") if "told" in headings else OF_WORDS
+    left = (*OF_WORDS, "rate", "kind", "bit", "stated", "lacks") if "stated" in headings else OF_WORDS
     shown = [[f"**{one}**" if one == MISSED else one for one in row] for row in rows]
     return table(headings, shown, left) + "\n"
