@@ -152,7 +152,7 @@ export class Figures {
     const most = rate * Math.max(...[...known, ...other].map(([, y]) => y), now[1] || 0) || 1;
     plot.ink = undefined;
     plot.begin([factor * curve.low, factor * curve.high], [0, 1.12 * most], `${name}, ${unit}`, `rate, ${per}`);
-    if (!known.length) plot.pen.fillText(WORDS.computing, plot.left + plot.font, plot.top + 2 * plot.font);
+    if (!known.length) plot.pen.fillText(WORDS.computing, plot.left + plot.font, plot.bottom - plot.font);
     if (pinned !== curve) plot.line(other.map(([x, y]) => [factor * x, rate * y]), "grey", 1.2, [4, 3]);
     plot.line(known.map(([x, y]) => [factor * x, rate * y]), "third", 1.8);
     plot.frame(factor * now[0], Number.isFinite(now[1]) ? rate * now[1] : 0);

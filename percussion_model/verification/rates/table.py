@@ -157,6 +157,7 @@ def other_rates(found: Rates) -> Iterator[str]:
 
 def _table(headings: tuple[str, ...], rows: list[list[str]]) -> str:
     """A table, and the empty line below it."""
-    left = (*OF_WORDS, "rate", "kind", "bit", "stated", "lacks") if "stated" in headings else OF_WORDS
+    others = ("rate", "kind", "bit", "stated", "lacks") if "stated" in headings else ()
+    left = (*OF_WORDS, *others)
     shown = [[f"**{one}**" if one == MISSED else one for one in row] for row in rows]
     return table(headings, shown, left) + "\n"
