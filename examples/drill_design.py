@@ -108,9 +108,7 @@ def main(out: Path, quick: bool = False) -> dict[str, Any]:
         middle.minorticks_off()
         middle.grid(False)
         title = f"Piston of {STEPPED_RATIO:g} bit lengths, stepped"
-        style.label(
-            middle, "lower section / length of the piston [-]", "its area / that above [-]", title
-        )
+        style.label(middle, "lower section / whole [-]", "its area / that above [-]", title)
         _draw_designs(right, blows, shown, stress)
         style.head(fig, f"Where {ENERGY:g} J of a blow go")
     return {"blows": blows, "rates": rates, "rate_errors": errors, "stress": stress, "best": found}

@@ -37,7 +37,7 @@ METHODS: dict[str, tuple[str, ...] | None] = {
     "reference": None,
     "t38_rods": ("wave", "explicit"),
 }
-DPI, DPI_OF_MANY = 110, 90
+DPI, DPI_OF_MANY = 110, 72
 CLOSED_WAVE, CLOSED_FEM = (5, 20, 40), (20, 40, 80)
 
 
