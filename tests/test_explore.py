@@ -368,6 +368,24 @@ def test_doubts_are_told_in_the_words_of_the_package(values, built, tmp_path):
     assert set(told) <= {*hints, *warned}
 
 
+def test_a_jam_and_the_work_of_a_great_feed_are_said(built, tmp_path):
+    jam = "hammer=dth4&bit=dth-115&rock=kuru-granite&rotation.stall_torque=200&feed.force=30000"
+
+    async def use(one):
+        texts = "['motion', 'notes', 'why'].map(id => document.getElementById(id).textContent)"
+        await one.until("document.getElementById('notes').textContent")
+        jammed = await one.ask(texts)
+        link = "hammer=dth4&bit=dth-115&rock=kuru-granite&feed.force=100000"
+        await one.ask(f"location.hash = '{link}'; new Promise(done => setTimeout(done, 20))")
+        await one.until(SHOWN)
+        return jammed, await one.ask(texts)
+
+    (motion, note, _), (_, _, why) = opened(built, tmp_path, use, f"#{jam}")
+    assert "the bit does not turn" in motion
+    assert "the rotation has jammed" in note
+    assert "The feed does so much work besides" in why
+
+
 def test_keys_alone_choose_move_and_play(built, tmp_path):
     async def use(one):
         await one.ask("document.querySelector('#hammers input:checked').focus()")

@@ -84,6 +84,18 @@ def test_every_equation_is_drawn_without_a_script_from_elsewhere(site):
         assert not re.findall(outside, one.read_text("utf-8")), one.name
 
 
+def test_a_click_on_a_figure_opens_it_in_full(site):
+    opened = 0
+    for page in site.rglob("*.html"):
+        for link, image in re.findall(
+            r'<a [^>]*href="([^"]*)"><img [^>]*src="([^"]*)"', page.read_text("utf-8")
+        ):
+            assert link == image
+            assert (page.parent / link).is_file()
+            opened += 1
+    assert opened > 50
+
+
 @pytest.fixture(scope="module")
 def found(site):
     """Pages that the search of the site lists first, by what is looked for."""
