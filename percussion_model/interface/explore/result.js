@@ -72,8 +72,8 @@ function whyWords(found, pinned, imperial) {
     return { frequency, blow: power / frequency, share, depth: 1 / (by * share) };
   };
   if (!found.rate || found.undamped) return "";
-  const own = parts(found), [unit, factor] = unitOf("length", imperial), blow = own.blow * own.share * own.depth;
-  const said = fill(own.share > 1 ? WORDS.energyOfFeed : WORDS.energyOf, { blow: inDigits(own.blow), share: inDigits(100 * own.share), advance: inDigits(factor * blow), unit });
+  const own = parts(found), [unit, factor] = unitOf("length", imperial), [work, per] = unitOf("energy", imperial), blow = own.blow * own.share * own.depth;
+  const said = fill(own.share > 1 ? WORDS.energyOfFeed : WORDS.energyOf, { blow: `${inDigits(per * own.blow)} ${work}`, share: inDigits(100 * own.share), advance: inDigits(factor * blow), unit });
   if (!pinned?.rate || pinned.undamped) return said;
   const before = parts(pinned), shares = Object.fromEntries(Object.keys(own).map(name => [name, inDigits(own[name] / before[name])]));
   return `${said} ${fill(WORDS.against, shares)}${found.stiffness > pinned.stiffness ? WORDS.softer : ""}`;
