@@ -99,6 +99,7 @@ CLEANED = {
     "not a number": (changed(90, 6, "NaN"), "torque: 1 of 120 cells"),
     "a dash": (changed(90, 3, "--"), "pressure: 1 of 120 cells"),
     "a sentinel": (changed(90, 2, "-9999"), "rate: 1 of 120 cells"),
+    "a word of loggers": (changed(90, 2, "Error"), "rate: 1 of 120 cells"),
     "an overflow": (changed(90, 2, "****"), "rate: 1 of 120 cells"),
     "a row cut off": (with_row(100, "99,0.9,0.6"), "1 rows are cut off"),
     "a repeated heading": (with_row(100, ",".join(HEAD)), "1 rows repeat the heading"),

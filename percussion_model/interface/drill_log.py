@@ -74,7 +74,10 @@ _OWN = {word: name for name, words in NAMES.items() for word in words}
 USUAL = {"time": "s", "depth": "m"}
 SAID = {"rpm": "rpm", "rotation rpm": "rpm", "bpm": "1/min"}
 # Words and numbers of loggers for a value that is missing.
-MISSING = frozenset(("", "nan", "null", "none", "-", "--", "n/a", "#n/a", "na", "inf", "-inf"))
+MISSING = frozenset((
+    "", "nan", "null", "none", "-", "--", "n/a", "#n/a", "na", "inf", "-inf", "?",
+    "err", "error", "fault", "bad", "invalid",
+))  # fmt: skip
 SENTINELS = frozenset((-999.0, -999.25, -9999.0, -99999.0))
 # Spellings of rigs, by SI unit of the column.
 SPELLED = {

@@ -12,6 +12,8 @@ from percussion_model.analysis.identify.profile import Profile
 from percussion_model.interface.plotting import style
 
 HOUR, RPM = 3600.0, 30.0 / np.pi
+# Nothing is drawn across a stretch without samples, of so many of their usual distances.
+GAP = 20.0
 # Colours of settings, by their share of what is usual in the hole.
 SHOWN = {"pressure": "pressure", "feed": "feed", "speed": "rotation"}
 
@@ -27,7 +29,10 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     figure = Figure(figsize=(10.0, 7.4), layout="constrained")
     axes = figure.subplots(1, 4, sharey=True, width_ratios=(1.3, 1.0, 1.0, 0.9))
     blue, red = style.LINE_COLOURS[0], style.LINE_COLOURS[1]
-    for ax, (low, value, high) in zip(axes, (found.interval(), found.strength()), strict=False):
+    apart = np.diff(found.depth, prepend=found.depth[0])
+    behind_gap = apart > GAP * np.median(apart)
+    for ax, ends in zip(axes, (found.interval(), found.strength()), strict=False):
+        low, value, high = (np.where(behind_gap, np.nan, one) for one in ends)
         ax.fill_betweenx(found.depth, 1e-6 * low, 1e-6 * high, color=blue, alpha=0.22, linewidth=0)
         ax.plot(1e-6 * value, found.depth, color=blue)
     axes[0].set_xlim(0.0, 1.15e-6 * float(np.quantile(found.interval()[2], 0.98)))
@@ -39,7 +44,8 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     axes[2].set_xlim(0.0, 1.1 * float(np.quantile(rate, 0.99)))
     usual = np.median(found.samples.settings, axis=0)
     for k, name in enumerate(SETTINGS):
-        axes[3].plot(found.samples.settings[:, k] / usual[k], found.depth, linewidth=0.9,
+        shown = np.where(behind_gap, np.nan, found.samples.settings[:, k] / usual[k])
+        axes[3].plot(shown, found.depth, linewidth=0.9,
                      color=style.LINE_COLOURS[k + 2], label=SHOWN[name])  # fmt: skip
     for ax in axes:
         for top in found.layers:
