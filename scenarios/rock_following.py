@@ -15,7 +15,7 @@ import numpy as np
 from percussion_model import Scene
 from percussion_model.analysis.identify.drill import drill_of
 from percussion_model.analysis.identify.filter import Noise, RockFilter
-from percussion_model.analysis.identify.part import DEGREE, to_numbers
+from percussion_model.analysis.identify.part import to_numbers
 from percussion_model.analysis.identify.prior import prior_of
 from percussion_model.analysis.identify.tabulate import REACH, tabulate
 from percussion_model.coupling import CoupledRun, Coupling
@@ -78,7 +78,7 @@ def numbers() -> dict[str, float]:
         for off in [REACH * prior.spread[k]]
     }
     ranges = {"pressure": PRESSURE, "feed": FEED, **ends}
-    table = tabulate(scene, drill.changes, ranges, points=POINTS, degree=DEGREE)
+    table = tabulate(scene, drill.changes, ranges, points=POINTS, with_splines=False)
     return to_numbers(RockFilter(table, prior.mean, prior.spread, NOISE))
 
 

@@ -70,16 +70,9 @@ REFUSED = {
     "binary": ("a\0b", "not a text file"),
     "prose": ("Drilled well today.\nNo numbers.\n", "row 1, column 1: 'Drilled well today.'"),
     "heading alone": (text_of([]), "row 1, column 1: no row of numbers"),
-    "a word": (changed(4, 2, "fast"), "row 6, column 3 .rate.: 'fast' is no number"),
-    "two points": (changed(7, 3, "24.0.1"), "row 9, column 4 .pressure.: '24.0.1'"),
-    "a unit in a cell": (changed(0, 4, "11 kN"), "row 2, column 5 .feed.: '11 kN'"),
-    "a formula": (changed(9, 5, "=A1"), "row 11, column 6 .speed.: '=A1'"),
-    "underlines": (changed(9, 3, "2_4"), "row 11, column 4 .pressure.: '2_4'"),
-    "an error of a sheet": (changed(2, 6, "#REF!"), "row 4, column 7 .torque.: '#REF!'"),
-    "a bad time": (changed(3, 0, "25 past"), "row 5, column 1 .time.: '25 past'"),
-    "a date of no calendar": (changed(3, 0, "2024-13-45 10:00:00"), "row 5, column 1 .time."),
-    "decimal commas between commas": (changed(5, 2, "0,6"), "row 7, column 8: 8 cells"),
-    "a cell too many": (with_row(4, "1,2,3,4,5,6,7,8"), "row 5, column 8: 8 cells"),
+    "words": (stepped(4, ["fast"] * 70, 2), "row 6, column 3 .rate.: 'fast' is no number"),
+    "units in cells": (stepped(0, ["11 kN"] * 120, 4), "row 2, column 5 .feed.: '11 kN'"),
+    "decimal commas between commas": (stepped(5, ["0,6"] * 90, 2), "row 7, column 8: 8 cells"),
     "no unit": (headed(2, "Penetration rate"), "row 1, column 3, 'Penetration rate': has no unit"),
     "no unit of pressure": (headed(3, "Hammer pressure"), "column 4, 'Hammer pressure': has no"),
     "another quantity": (headed(3, "Percussion pressure [kN]"), "row 1, column 4.*'kN' must be"),
@@ -95,6 +88,18 @@ REFUSED = {
 }
 # Text of a log, and what was left out or decided, with its count.
 CLEANED = {
+    "a word": (changed(4, 2, "fast"), "the first in row 6, column 3 (rate): 'fast'"),
+    "two points": (changed(7, 3, "24.0.1"), "the first in row 9, column 4 (pressure): '24.0.1'"),
+    "a unit in a cell": (
+        changed(0, 4, "11 kN"),
+        "feed: 1 cells are no numbers, the first in row 2",
+    ),
+    "a formula": (changed(9, 5, "=A1"), "row 11, column 6 (speed): '=A1'"),
+    "underlines": (changed(9, 3, "2_4"), "row 11, column 4 (pressure): '2_4'"),
+    "an error of a sheet": (changed(2, 6, "#REF!"), "row 4, column 7 (torque): '#REF!'"),
+    "a bad time": (changed(3, 0, "25 past"), "row 5, column 1 (time): '25 past'"),
+    "a date of no calendar": (changed(3, 0, "2024-13-45 10:00:00"), "row 5, column 1 (time)"),
+    "a cell too many": (with_row(4, "1,2,3,4,5,6,7,8"), "too many cells, the first row 5"),
     "empty cells": (changed(90, 2, ""), "rate: 1 of 120 cells"),
     "not a number": (changed(90, 6, "NaN"), "torque: 1 of 120 cells"),
     "a dash": (changed(90, 3, "--"), "pressure: 1 of 120 cells"),
@@ -229,7 +234,7 @@ def test_a_bad_mapping_names_its_key(text, said, tmp_path):
 
 def test_the_command_ends_in_that_line(tmp_path, capsys):
     path = tmp_path / "log.csv"
-    path.write_text(REFUSED["a word"][0], encoding="utf-8")
+    path.write_text(REFUSED["words"][0], encoding="utf-8")
     words = ("--hammer", "dth5", "--out", tmp_path / "out")
     assert percussion("identify", path, *words) == 2
     assert "row 6, column 3 (rate): 'fast' is no number" in capsys.readouterr().err.replace(

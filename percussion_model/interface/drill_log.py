@@ -1,9 +1,9 @@
 """Logs of drill rigs, as they come.
 
 The heading may stand in any of the first rows, with columns in any order; units stand in it, in a
-row below it, or in a mapping file. A cell without a value is missing, which is counted; a row that
-was cut off, or that repeats the heading, is left out. What else is no number ends in one line that
-names row and column.
+row below it, or in a mapping file. A cell without a value, or with what is no number, is missing,
+which is counted; a row with too few or too many cells, or that repeats the heading, is left out. A
+log of which most is so ends in one line that names row and column.
 """
 
 from __future__ import annotations
@@ -90,6 +90,8 @@ _CLOCK = re.compile(
 )
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%Y/%m/%d")
 DAY = 86400.0
+# Share of a column's cells, or of the rows, that may be bad.
+MOST_BAD = 0.5
 _WANTED = "rate is wanted, or depth and time; and pressure, feed, speed, torque as far as there are"
 
 
@@ -125,6 +127,7 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
     number, separator, titles = _heading(path, lines, given)
     columns = _columns(path, number, titles, given, mapping)
     table: list[tuple[int, list[str]]] = []
+    wide: list[tuple[int, int]] = []
     cut = again = 0
     for at, line in enumerate(lines[number:], number + 1):
         if not line.strip() or line.lstrip().startswith(COMMENTS):
@@ -139,18 +142,23 @@ def read_log(path: Path, mapping: Path | None = None) -> Log:
         elif not table and not cut and _is_of_units(cells):
             columns = [_with_unit(one, cells) for one in columns]
         elif len(cells) > len(titles):
-            hint = "; a decimal comma needs another separator" if separator == "," else ""
-            raise IdentifyError(
-                f"{path}: row {at}, column {len(titles) + 1}: {len(cells)} cells, the heading in "
-                f"row {number} has {len(titles)}{hint}"
-            )
+            wide.append((at, len(cells)))
         elif len(cells) < len(titles):
             cut += 1
         else:
             table.append((at, cells))
+    if len(wide) > MOST_BAD * (len(table) + len(wide)):
+        at, count = wide[0]
+        hint = "; a decimal comma needs another separator" if separator == "," else ""
+        raise IdentifyError(
+            f"{path}: row {at}, column {len(titles) + 1}: {count} cells, the heading in "
+            f"row {number} has {len(titles)}{hint}"
+        )
     if not table:
         raise IdentifyError(f"{path}: row {number}, column 1: no row of numbers is behind it")
     notes = [f"{cut} rows are cut off; dropped"] * bool(cut)
+    if wide:
+        notes.append(f"{len(wide)} rows have too many cells, the first row {wide[0][0]}; dropped")
     used = {one.place for one in columns}
     unused = [
         f"{k + 1} {shortened(one)!r}" for k, one in enumerate(titles) if k not in used and one
@@ -302,8 +310,17 @@ def _values(
 ) -> np.ndarray:
     """Numbers of a column, SI."""
     where = f"row {heading}, column {one.place + 1}, {shortened(titles[one.place])!r}"
-    numbers = np.array([_number(path, one, row, separator) for row in table])
-    lost = int(np.isnan(numbers).sum())
+    numbers, bad = np.empty(len(table)), []
+    for k, (at, cells) in enumerate(table):
+        value = _number(cells[one.place], one.name == "time", separator)
+        numbers[k] = np.nan if value is None else value
+        bad += [f"row {at}, column {one.place + 1} ({one.name}): {shortened(cells[one.place])!r}"
+                ] * (value is None)  # fmt: skip
+    if len(bad) > MOST_BAD * len(table):
+        raise IdentifyError(f"{path}: {bad[0]} is no number")
+    if bad:
+        notes.append(f"{one.name}: {len(bad)} cells are no numbers, the first in {bad[0]}; dropped")
+    lost = int(np.isnan(numbers).sum()) - len(bad)
     if lost:
         notes.append(f"{one.name}: {lost} of {len(table)} cells have no value")
     if one.name == "time" and any(_CLOCK.fullmatch(cells[one.place]) for _, cells in table):
@@ -328,20 +345,14 @@ def _factor(unit: str, one: _Column, where: str) -> float:
     return factor_of(unit, COLUMNS[one.name], where)
 
 
-def _number(path: Path, one: _Column, row: tuple[int, list[str]], separator: str) -> float:
-    word = row[1][one.place]
+def _number(word: str, is_time: bool, separator: str) -> float | None:
+    """Value of a cell; NaN where it is missing, None where it is no number."""
     if word.lower() in MISSING or set(word) == {"*"}:
         return float("nan")
-    clock = _CLOCK.fullmatch(word) if one.name == "time" else None
+    clock = _CLOCK.fullmatch(word) if is_time else None
     if clock and (seconds := _seconds(clock)) is not None:
         return seconds
     value = finite(word if separator == "," else word.replace(",", "."))
-    if value is None:
-        comma = ": commas separate the columns" if "," in word and separator == "," else ""
-        raise IdentifyError(
-            f"{path}: row {row[0]}, column {one.place + 1} ({one.name}): {shortened(word)!r} is no "
-            f"number{comma}"
-        )
     return float("nan") if value in SENTINELS else value
 
 

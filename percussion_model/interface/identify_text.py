@@ -97,7 +97,7 @@ def plan_rows(changes: Sequence[Change]) -> list[tuple[str, ...]]:
             name, unit, factor = SETTING[one.setting]
             words = f"{name} to {factor * one.value:.3g} {unit}, {100 * one.share:.0f} % of now"
         also = ", ".join(WORDS[name][0] for name in one.narrowed) or "–"
-        rows.append((words, f"± {100 * one.interval:.2g} %", also))
+        rows.append((words, f"± {100 * one.interval:.1f} %", also))
     return rows
 
 

@@ -265,11 +265,23 @@ def without_lags(log: Log, samples: Samples, table: Table, mean: np.ndarray) -> 
             continue
         lag = _lag(np.log(samples.signals[:, k]), expected[:, k])
         if lag:
-            columns[name] = np.concatenate([columns[name][lag:], np.full(lag, np.nan)])
+            columns[name] = columns[name][_later(log, lag)]
             notes.append(
                 f"{name}: {lag} rows ({100.0 * lag * step:.2g} cm) behind the settings; corrected"
             )
     return replace(log, columns=columns, notes=notes)
+
+
+def _later(log: Log, lag: int) -> np.ndarray:
+    """Rows that are so many usual rows later; the last one where there is none."""
+    count = len(log.rows)
+    time = log.columns.get("time")
+    later = np.arange(count) + lag
+    if time is not None and np.all(np.diff(time) >= 0.0):
+        step = np.diff(time)
+        usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
+        later = np.searchsorted(time, time + (lag - 0.5) * usual)
+    return np.minimum(later, count - 1)
 
 
 def _lag(signal: np.ndarray, expected: np.ndarray) -> int:

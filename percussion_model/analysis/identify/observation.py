@@ -13,7 +13,7 @@ rate tells q alone; the motion does not know of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,6 +33,7 @@ CRUSHED, BLOWS, WORK, FORCE, RUBBING = range(5)
 LEAST = 1e-3
 # Polynomials are not asked further out than this, by half the range of the table.
 EDGE = 1.1
+SLOPE = 0.01  # steps of slopes, by the same
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,13 @@ class Table:
         Of the hole [m^2]; mean radius of the buttons [m].
     buttons, exponent : float
         Of the bit; of the loading.
+    stretch : ndarray, shape (4,)
+        By which the scaled logarithms are multiplied for distances: where blows meet the waves of
+        earlier ones, they change fast along one of them.
+    nodes : ndarray, shape (n, 4)
+        Points of splines that are added, stretched; none for polynomials alone.
+    weights : ndarray, shape (5, n)
+        Of thin-plate splines about them.
     """
 
     middle: np.ndarray
@@ -64,6 +72,9 @@ class Table:
     radius: float
     buttons: float
     exponent: float
+    stretch: np.ndarray = field(default_factory=lambda: np.ones(4))
+    nodes: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    weights: np.ndarray = field(default_factory=lambda: np.empty((5, 0)))
 
     def contains(self, settings: np.ndarray) -> np.ndarray:
         """Whether pressure and feed of settings, shape (n, 3), are in the table."""
@@ -83,7 +94,10 @@ class Table:
         ndarray, shape (5, n)
         """
         inside = np.clip((points - self.middle) / self.half, -EDGE, EDGE)
-        return self.terms @ basis(inside, self.powers).T
+        found = self.terms @ basis(inside, self.powers).T
+        if len(self.nodes):
+            found += self.weights @ splines(inside * self.stretch, self.nodes).T
+        return found
 
     def predict(self, unknowns: np.ndarray, settings: np.ndarray) -> np.ndarray:
         """Logarithms of what a rig measures.
@@ -104,17 +118,41 @@ class Table:
         points = np.empty((len(unknowns), 4))
         points[:, :2] = np.log(settings[:, :2])
         points[:, 2], points[:, 3] = unknowns[:, GAMMA], unknowns[:, STIFFNESS]
-        rows = self.rows(points)
-        crushed, blows, work, force, rubbing = np.exp(rows)
-        speed = settings[:, 2]
-        turns = self.radius * speed / (blows * np.exp(unknowns[:, RENEWAL]))
-        known = np.maximum(crushed * np.exp(-turns), self.buttons * np.exp(unknowns[:, THRESHOLD]))
+        rows = self.rows(points).T
+        return self.signals(rows, unknowns, settings[:, 2])
+
+    def about(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of points, shape (n, 5), and their slopes there, shape (n, 4, 5)."""
+        steps = SLOPE * np.diag(self.half)
+        many = np.concatenate([points, *(points + s for s in steps), *(points - s for s in steps)])
+        rows = self.rows(many).T.reshape(2 * len(steps) + 1, len(points), -1)
+        up, down = rows[1 : len(steps) + 1], rows[len(steps) + 1 :]
+        slopes = (up - down) / (2.0 * SLOPE * self.half[:, np.newaxis, np.newaxis])
+        return rows[0], slopes.transpose(1, 0, 2)
+
+    def signals(
+        self, rows: np.ndarray, unknowns: np.ndarray, speed: float | np.ndarray
+    ) -> np.ndarray:
+        """Logarithms of what a rig measures, shape (..., 3), by those of a blow's numbers."""
+        crushed, blows, work, force, rubbing = np.moveaxis(np.exp(rows), -1, 0)
+        q, _, _, renewal, threshold, friction = np.moveaxis(unknowns, -1, 0)
+        turns = self.radius * speed / (blows * np.exp(renewal))
+        known = np.maximum(crushed * np.exp(-turns), self.buttons * np.exp(threshold))
         beyond = np.maximum(crushed - known, LEAST * crushed)
-        gained = np.minimum(beyond * np.exp(-unknowns[:, Q]) / self.area, work / force)
+        gained = np.minimum(beyond * np.exp(-q) / self.area, work / force)
         fresh = 1.0 - np.exp(-turns / (self.exponent + 1.0))
         climbing = fresh * np.maximum(work - force * gained, 0.0) * blows / speed
-        torque = climbing + rubbing * np.exp(unknowns[:, FRICTION])
-        return np.stack([np.log(gained * blows), rows[BLOWS], np.log(torque)], axis=1)
+        torque = climbing + rubbing * np.exp(friction)
+        return np.stack([np.log(gained * blows), rows[..., BLOWS], np.log(torque)], axis=-1)
+
+
+def splines(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Thin-plate splines r^2 ln r about nodes, shape (n, nodes)."""
+    square = (
+        np.sum(x * x, axis=1)[:, np.newaxis] + np.sum(nodes * nodes, axis=1) - 2.0 * x @ nodes.T
+    )
+    square = np.maximum(square, 1e-12)
+    return 0.5 * square * np.log(square)
 
 
 def basis(x: np.ndarray, powers: np.ndarray) -> np.ndarray:

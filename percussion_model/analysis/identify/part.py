@@ -34,6 +34,7 @@ def to_numbers(filter_: RockFilter) -> dict[str, float]:
         found |= {f"{row}[{j + 1}]": one for j, one in enumerate(table.terms[k])}
     for k, name in enumerate(SIGNALS):
         found |= {f"error.{name}": table.errors[k], f"noise.{name}": filter_.noise[k]}
+    found["noise.varies"] = filter_.varies
     for k, name in enumerate(UNKNOWNS):
         found |= {f"prior.{name}": filter_.mean[k], f"spread.{name}": filter_.spread[k]}
     return {name: float(value) for name, value in found.items()}
@@ -51,5 +52,5 @@ def from_numbers(values: Mapping[str, float]) -> RockFilter:
         several("error.{}", SIGNALS), values["hole_area"], values["mean_radius"],
         values["buttons"], values["loading_exponent"],
     )  # fmt: skip
-    noise = Noise(*several("noise.{}", SIGNALS).tolist())
+    noise = Noise(*several("noise.{}", (*SIGNALS, "varies")).tolist())
     return RockFilter(table, several("prior.{}", UNKNOWNS), several("spread.{}", UNKNOWNS), noise)

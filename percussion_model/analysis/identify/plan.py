@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from percussion_model.analysis.identify.filter import ALIKE, VARIES
+from percussion_model.analysis.identify.filter import alike
 from percussion_model.analysis.identify.observation import (
     RATE,
     SETTINGS,
-    SIGNALS,
     UNKNOWNS,
     Q,
     Table,
@@ -21,11 +19,14 @@ from percussion_model.analysis.identify.observation import (
 from percussion_model.analysis.identify.profile import SURE, Profile
 
 # Shares of a setting that are tried, and hole that is drilled [m], half of it changed.
-SHARES = {"pressure": (0.85, 0.92, 1.08), "feed": (0.85, 1.15, 1.3), "speed": (0.4, 0.6, 1.5)}
+SHARES = {
+    "pressure": (0.85, 0.88, 0.92, 0.96, 1.04, 1.08), "feed": (0.85, 0.92, 1.08, 1.15, 1.22, 1.3),
+    "speed": (0.4, 0.5, 0.6, 0.8, 1.25, 1.5),
+}  # fmt: skip
 METRE, CHANGED = 1.0, 0.5
 # Room of a table beyond the settings of a log, so that changes lie in it.
 ROOM = {"pressure": (0.84, 1.09), "feed": (0.84, 1.31)}
-_STEP = 0.05  # of slopes, by the logarithm
+_STEP = 0.01  # of slopes, by the logarithm
 
 
 @dataclass(frozen=True)
@@ -91,27 +92,30 @@ def _after(
     profile: Profile, settings: Sequence[np.ndarray], counts: Sequence[float], given: np.ndarray
 ) -> np.ndarray:
     """Standard deviations of the unknowns after samples at settings."""
-    table, x = profile.table, profile.mean[-1]
-    slopes, noise = [], []
-    for one, count in zip(settings, counts, strict=True):
-        slopes.append(slopes_of(table, x, one)[given])
-        own = profile.noise.values() ** 2 / count + np.array([VARIES**2, 0.0, 0.0])
-        noise.append(own[given])
-    errors = np.diag(table.errors[given] ** 2)
-    matrix, rows = np.concatenate(slopes), len(settings)
-    alike = np.eye(rows)
-    for a, b in pairwise(range(rows)):
-        off = np.log(settings[a] / settings[b]) / (3.0 * ALIKE)
-        alike[a, b] = alike[b, a] = math.exp(-0.5 * float(off @ off))
-    total = matrix @ profile.covariance @ matrix.T + np.kron(alike, errors)
-    total += np.diag(np.concatenate(noise))
+    logs = np.log(settings)
+    slopes = slopes_of(profile.table, profile.mean[-1], np.array(settings))[:, given]
+    own = profile.noise.values() ** 2 / np.array(counts)[:, np.newaxis]
+    own[:, RATE] += profile.noise.varies**2
+    matrix = np.concatenate(slopes)
+    errors = np.diag(profile.table.errors[given] ** 2)
+    total = matrix @ profile.covariance @ matrix.T + np.kron(alike(logs), errors)
+    total += np.diag(own[:, given].ravel())
     gain = np.linalg.solve(total, matrix @ profile.covariance).T
     return np.sqrt(np.diag(profile.covariance - gain @ matrix @ profile.covariance))
 
 
 def slopes_of(table: Table, unknowns: np.ndarray, settings: np.ndarray) -> np.ndarray:
-    """Slopes of the signals' logarithms by those of the unknowns, shape (3, 6)."""
+    """Slopes of the signals' logarithms by those of the unknowns, shape (n, 3, 6).
+
+    Parameters
+    ----------
+    unknowns : ndarray, shape (6,)
+    settings : ndarray, shape (n, 3)
+    """
     steps = _STEP * np.eye(len(unknowns))
-    values = table.predict(np.concatenate([unknowns + steps, unknowns - steps]), settings)
-    up, down = values[: len(unknowns)], values[len(unknowns) :]
-    return np.asarray((up - down).T.reshape(len(SIGNALS), -1) / (2.0 * _STEP))
+    up, down = (
+        np.stack([table.predict(np.tile(unknowns + step, (len(settings), 1)), settings)
+                  for step in sign * steps], axis=2)
+        for sign in (1.0, -1.0)
+    )  # fmt: skip
+    return (up - down) / (2.0 * _STEP)

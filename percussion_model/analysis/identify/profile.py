@@ -20,16 +20,17 @@ from percussion_model.analysis.identify.cleaning import (
     without_lags,
 )
 from percussion_model.analysis.identify.drill import Drill
-from percussion_model.analysis.identify.filter import Noise, RockFilter
+from percussion_model.analysis.identify.filter import ALIKE, Noise, RockFilter
 from percussion_model.analysis.identify.observation import (
     GAMMA,
+    RATE,
     SIGNALS,
     STIFFNESS,
     UNKNOWNS,
     Q,
     Table,
 )
-from percussion_model.analysis.identify.part import AXES, DEGREE, POINTS
+from percussion_model.analysis.identify.part import AXES, POINTS
 from percussion_model.analysis.identify.prior import WITHIN, Prior, prior_of
 from percussion_model.analysis.identify.tabulate import REACH, IdentifyError, tabulate
 from percussion_model.scene.rocks.breaking import (
@@ -46,7 +47,10 @@ DETERMINED = 0.5
 # Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
 LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
 # Points and degree of a table; blows of a drill string take fifty times as long.
-MANY, FEW = (140, 3), (60, 2)
+MANY, FEW = 500, 80
+# Rock from place to place, by the logarithm of its rate: by samples of a block, of which there have
+# to be so many pairs at like settings; what is assumed without, at least, and at most.
+BLOCK, FEWEST_STEPS, VARIES, LEAST_VARIES, MOST_VARIES = 20, 8, 0.01, 0.003, 0.1
 # Mean absolute deviation of a normal variable, by its standard deviation.
 MAD = 0.6745
 
@@ -189,7 +193,7 @@ def identify(
     if table is None:
         wanted = _ranges(samples, prior, room or {})
         size = FEW if scene["effects.string"] else MANY
-        table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s), *size)
+        table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s), size)
     samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
     samples = samples.kept(table.contains(samples.settings), "pressure or feed out of the usual")
     if len(samples.depth) < FEWEST:
@@ -208,7 +212,7 @@ def part_filter(profile: Profile, drill: Drill) -> RockFilter:
     middle, half = profile.table.middle, profile.table.half
     ends = zip(np.exp(middle - half).tolist(), np.exp(middle + half).tolist(), strict=True)
     ranges = dict(zip(AXES, ends, strict=True))
-    table = tabulate(drill.scene, drill.changes, ranges, points=POINTS, degree=DEGREE)
+    table = tabulate(drill.scene, drill.changes, ranges, points=POINTS, with_splines=False)
     return RockFilter(table, profile.prior.mean, profile.prior.spread, profile.noise)
 
 
@@ -231,14 +235,12 @@ def noise_of(samples: Samples, table: Table, prior: Prior) -> Noise:
     Noise that goes on from one sample to the next counts for more, as many of its samples tell no
     more than few.
     """
-    count = len(samples.depth)
-    unknowns = np.broadcast_to(prior.mean, (count, len(UNKNOWNS)))
+    unknowns = np.broadcast_to(prior.mean, (len(samples.depth), len(UNKNOWNS)))
     off = np.log(samples.signals) - table.predict(unknowns, samples.settings)
-    found = []
-    for k in range(len(SIGNALS)):
+    found = dict(zip(SIGNALS, LEAST_NOISE, strict=True))
+    for k, name in enumerate(SIGNALS):
         values = off[np.isfinite(off[:, k]), k]
         if len(values) < 3:
-            found.append(LEAST_NOISE[k])
             continue
         one, two = (_scatter(values[n:] - values[:-n]) for n in (1, 2))
         # of noise that fades by r from sample to sample, differences over 2 and 1 are as 1 + r
@@ -246,8 +248,25 @@ def noise_of(samples: Samples, table: Table, prior: Prior) -> Noise:
         kept = min(max(kept, 0.0), 0.9)
         one = float(np.median(np.abs(np.diff(values)))) / MAD  # which outliers hardly move
         sigma = one / math.sqrt(2.0 * (1.0 - kept)) * math.sqrt((1.0 + kept) / (1.0 - kept))
-        found.append(float(np.clip(sigma, LEAST_NOISE[k], MOST_NOISE[k])))
-    return Noise(*found)
+        found[name] = float(np.clip(sigma, LEAST_NOISE[k], MOST_NOISE[k]))
+    return Noise(**found, varies=_varies(off[:, RATE], samples.settings, found["rate"]))
+
+
+def _varies(off: np.ndarray, settings: np.ndarray, sigma: float) -> float:
+    """What rock differs by from place to place in a layer, as far as rates show it beyond noise.
+
+    Medians of a block have 1.57 times the variance of its mean.
+    """
+    known = np.flatnonzero(np.isfinite(off))
+    there = known[: len(known) // BLOCK * BLOCK].reshape(-1, BLOCK)
+    logs = np.log(settings)[there]
+    even = np.ptp(np.concatenate([logs[1:], logs[:-1]], axis=1), axis=1).max(axis=1) < ALIKE
+    steps = np.diff(np.median(off[there], axis=1))[even]
+    if len(steps) < FEWEST_STEPS:
+        return VARIES
+    noise = 1.57 * sigma**2 / BLOCK * (1.0 + SURE * math.sqrt(2.0 / len(steps)))
+    beyond = 0.5 * _scatter(steps) ** 2 - noise
+    return float(np.clip(math.sqrt(max(beyond, 0.0)), LEAST_VARIES, MOST_VARIES))
 
 
 def _scatter(steps: np.ndarray) -> float:

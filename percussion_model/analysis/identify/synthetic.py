@@ -16,10 +16,12 @@ from percussion_model.analysis.identify.observation import (
     FRICTION,
     GAMMA,
     RENEWAL,
+    SETTINGS,
     STIFFNESS,
     THRESHOLD,
     UNKNOWNS,
     Q,
+    Table,
 )
 from percussion_model.analysis.identify.prior import KEYS, Prior
 from percussion_model.analysis.identify.tabulate import ETA, IdentifyError
@@ -66,6 +68,7 @@ def make_hole(
     tops: Sequence[float] = (0.0, 5.0, 10.0, 15.0),
     depth: float = 20.0,
     held: float = 0.5,
+    table: Table | None = None,
 ) -> Hole:
     """Drill a hole through layers drawn from a prior.
 
@@ -78,6 +81,8 @@ def make_hole(
         metres; one, and nothing changes.
     tops : sequence of float
         Where layers begin [m].
+    table : Table, optional
+        Whose blows drill in place of the scene's.
     """
     random = np.random.default_rng(seed)
     whole = prior.mean + prior.spread * random.standard_normal(len(UNKNOWNS)).clip(-2.0, 2.0)
@@ -95,7 +100,7 @@ def make_hole(
         layer = int(np.searchsorted(tops, here, side="right")) - 1
         which = int(here / held) % len(schedule)
         if (layer, which) not in known:
-            known[layer, which] = _settled(drill, unknowns[layer], schedule[which])
+            known[layer, which] = _settled(drill, unknowns[layer], schedule[which], table)
         signals, given = known[layer, which], schedule[which]
         soft = min(1.0, 0.5 + here)  # collaring with less of all
         rows.append((time, here, *(soft * given[k] for k in ("pressure", "feed")), given["speed"],
@@ -108,8 +113,13 @@ def make_hole(
     return Hole(_with_faults(np.array(rows), seed, random), np.array(tops), unknowns)
 
 
-def _settled(drill: Drill, unknowns: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
+def _settled(
+    drill: Drill, unknowns: np.ndarray, given: Mapping[str, float], table: Table | None
+) -> np.ndarray:
     """Rate, frequency and torque of the truth, SI."""
+    if table is not None:
+        here = np.array([given[name] for name in SETTINGS])
+        return np.asarray(np.exp(table.predict(unknowns[np.newaxis], here)[0]))
     scene = drill.scene
     values = dict(zip(KEYS, np.exp(unknowns).tolist(), strict=False))
     values[KEYS[0]] *= scene[ETA]

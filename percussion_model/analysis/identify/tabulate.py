@@ -1,25 +1,28 @@
 """The table of settled responses that a filter asks, of a hammer, its bit and a range of settings.
 
-Three settled runs a point, all of one motion: without friction, with twice the crushing energy,
-and with friction. All of fresh rock, so that a blow breaks what it crushes beyond the threshold.
+A settled run a point, without friction, and for some two more of the same motion: with twice the
+crushing energy, and with friction. All of fresh rock, so that a blow breaks what it crushes beyond
+the threshold.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from itertools import product
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from percussion_model.analysis.identify.observation import (
     BLOWS,
-    RUBBING,
+    CRUSHED,
     WORK,
     Table,
     basis,
+    splines,
 )
+from percussion_model.analysis.identify.part import AXES, POWERS
 from percussion_model.analysis.stationary import settled
 from percussion_model.scene.rows import SceneError
 from percussion_model.scene.scene import Scene
@@ -29,11 +32,15 @@ from percussion_model.simulation.simulate import SimulationError
 LEAST_HALF, REACH = 0.02, 2.2
 # What a run may be off by: two hundredths in the rate of a motion that does not settle.
 TOLERANCE, SCATTER, MOST_BLOWS = 1e-3, 0.02, 150
-# Errors of the table by those of points left out of it: they go together from point to point and
-# from layer to layer, and motions of several kinds lie in one table.
+# Of polynomials alone: errors go together, as motions of several kinds lie in one table.
 DOUBT = 1.3
+# Points of which one has forces, which are even, and with which lengths of splines are sought.
+EVERY, MOST_SOUGHT = 4, 150
 # Points that may fail, as where a hammer does not start, by their number.
 MOST_FAILED = 0.25
+# Of splines, that they need not meet each point.
+SMOOTH = 1e-4
+AROUND = np.concatenate([np.eye(4), -np.eye(4)])
 GAMMA_KEY, STIFFNESS_KEY = "rock.unloading_ratio", "rock.loading_stiffness"
 ENERGY, ETA = "breaking.crushing_energy", "breaking.efficiency"
 
@@ -62,10 +69,10 @@ def tabulate(
     drive: Drive,
     ranges: Mapping[str, tuple[float, float]],
     progress: Callable[[float], None] | None = None,
-    points: int = 140,
-    degree: int = 3,
+    points: int = 400,
+    with_splines: bool = True,
 ) -> Table:
-    """Run a hammer over ranges of its settings and of the rock, and fit polynomials.
+    """Run a hammer over ranges of its settings and of the rock, and fit what comes out.
 
     Parameters
     ----------
@@ -74,12 +81,14 @@ def tabulate(
     drive : callable
         Changes of the scene for a pressure [Pa].
     ranges : mapping of tuple
-        Least and greatest "pressure" [Pa], "feed" [N], "unloading_ratio" and
+        Least and greatest of each of `AXES`: "pressure" [Pa], "feed" [N], "unloading_ratio" and
         "loading_stiffness" [N/m].
     progress : callable, optional
         Called with the share that is done.
-    points, degree : int
-        Points that are run, and degree of the polynomials through them.
+    points : int
+        That are run.
+    with_splines : bool
+        Splines beside polynomials; without, a part of a drilling system can take the table.
 
     Raises
     ------
@@ -87,34 +96,53 @@ def tabulate(
         If the hammer does not drill in too many points.
     """
     check_scene(scene)
-    ends = np.log([ranges[k] for k in ("pressure", "feed", "unloading_ratio", "loading_stiffness")])
+    ends = np.log([ranges[axis] for axis in AXES])
     middle, half = ends.mean(axis=1), np.maximum(0.5 * np.ptp(ends, axis=1), LEAST_HALF)
-    powers = np.array([p for p in product(range(degree + 1), repeat=4) if sum(p) <= degree])
-    kept, rows, why = [], [], ""
+    kept: list[np.ndarray] = []
+    blows, few, pushes, why = [], [], [], ""
     for k, place in enumerate(spread_points(points, 4)):
         if progress is not None:
             progress(k / points)
+        fresh = _fresh(scene, drive, np.exp(middle + half * place))
         try:
-            rows.append(_blow(scene, drive, np.exp(middle + half * place)))
+            one = _means(fresh)
+            if k % EVERY == 0 or not with_splines:
+                pushes.append(_forces(fresh, one))
+                few.append(len(kept))
         except (SceneError, SimulationError, IdentifyError) as error:
             why = str(error)
         else:
             kept.append(place)
+            blows.append(one)
     if len(kept) < (1.0 - MOST_FAILED) * points:
         raise IdentifyError(
             f"the hammer drills in {len(kept)} of {points} points of the table alone: narrow the "
             f"range of pressure and feed, or correct its units; the last error: {why}"
         )
-    x, y = basis(np.array(kept), powers), np.array(rows)
-    terms, left_out = _fit(x, y)
-    crushed, blows, work, _, rubbing = left_out.T
-    climbing = np.exp(y[:, WORK] + y[:, BLOWS]) / scene["rotation.speed"]
-    share = climbing / (climbing + scene["rotation.friction"] * np.exp(y[:, RUBBING]))
-    torque = share * (work + blows) + (1.0 - share) * rubbing
-    errors = np.array([_spread(one) for one in (crushed + blows, blows, torque)])
+    x, (volume, frequency, torque) = np.array(kept), np.array(blows).T
+    stretch = np.ones(4)
+    if with_splines:
+        some = slice(MOST_SOUGHT)
+        stretch = _stretch(x[some], np.log(frequency * volume)[some, np.newaxis])
+    area, speed = hole_area(scene), scene["rotation.speed"]
+    buttons = float(scene["breaking.buttons"])
+    fit = partial(_fit, stretch=stretch, with_splines=with_splines)
+    forces, force_weights, rubbing_off = fit(x[few], np.log(pushes))
+    rows = basis(x, POWERS) @ forces + splines(x * stretch, x[few] * stretch) @ force_weights
+    crushed = volume * scene[ENERGY] / scene[ETA] + buttons * scene["breaking.threshold"]
+    work = torque * speed / frequency + np.exp(rows[:, 0]) * volume / area
+    terms, weights, off = fit(x, np.log(np.stack([crushed, frequency, work], axis=1)))
+    every = np.zeros((len(x), 2))
+    every[few] = force_weights
+    climbing = (work * frequency / speed)[few]
+    share = climbing / (climbing + scene["rotation.friction"] * np.array(pushes)[:, 1])
+    turned = share * (off[few, WORK] + off[few, BLOWS]) + (1.0 - share) * rubbing_off[:, 1]
+    sizes = [_spread(one) for one in (off[:, CRUSHED] + off[:, BLOWS], off[:, BLOWS], turned)]
+    errors = np.array(sizes) * (1.0 if with_splines else DOUBT)
+    added = (stretch, x * stretch, np.hstack([weights, every]).T) if with_splines else ()
     return Table(
-        middle, half, powers, terms.T, errors, hole_area(scene), scene["rotation.mean_radius"],
-        float(scene["breaking.buttons"]), _exponent(scene),
+        middle, half, POWERS, np.hstack([terms, forces]).T, errors, area,
+        scene["rotation.mean_radius"], buttons, _exponent(scene), *added,
     )  # fmt: skip
 
 
@@ -139,10 +167,10 @@ def _exponent(scene: Scene) -> float:
     return float(scene["rock.loading_exponent"]) if scene["effects.rock"] == "power" else 1.0
 
 
-def _blow(scene: Scene, drive: Drive, values: np.ndarray) -> list[float]:
-    """Logarithms of W, f, A, F and r F_0 at pressure, feed, unloading ratio and stiffness."""
+def _fresh(scene: Scene, drive: Drive, values: np.ndarray) -> Scene:
+    """The scene at pressure, feed, unloading ratio and stiffness, of fresh rock, frictionless."""
     pressure, feed, gamma, stiffness = map(float, values)
-    scene = scene.replace(
+    return scene.replace(
         **dict(drive(pressure)),
         **{
             "feed.force": feed, GAMMA_KEY: gamma, STIFFNESS_KEY: stiffness,
@@ -150,16 +178,14 @@ def _blow(scene: Scene, drive: Drive, values: np.ndarray) -> list[float]:
             "rotation.stall_torque": 0.0, "rotation.response": 0.0, "breaking.wear_length": 0.0,
         },
     )  # fmt: skip
-    energy = scene[ENERGY]
-    plain = _means(scene)
-    denser = _means(scene.replace(**{ENERGY: 2.0 * energy}))
+
+
+def _forces(scene: Scene, plain: tuple[float, float, float]) -> tuple[float, float]:
+    """Mean force F on the rock [N], and r F_0 [N m], by rock twice as hard and by friction."""
+    denser = _means(scene.replace(**{ENERGY: 2.0 * scene[ENERGY]}))
     rubbed = _means(scene.replace(**{"rotation.friction": 1.0}))
-    volume, blows, torque = plain
-    area, speed = hole_area(scene), scene["rotation.speed"]
-    crushed = volume * energy / scene[ETA] + scene["breaking.buttons"] * scene["breaking.threshold"]
-    force = (denser[2] - torque) * speed * area / ((volume - denser[0]) * blows)
-    work = torque * speed / blows + force * volume / area
-    return [math.log(one) for one in (crushed, blows, work, force, rubbed[2] - torque)]
+    power = (denser[2] - plain[2]) * scene["rotation.speed"] * hole_area(scene)
+    return power / ((plain[0] - denser[0]) * plain[1]), rubbed[2] - plain[2]
 
 
 def _means(scene: Scene) -> tuple[float, float, float]:
@@ -175,13 +201,41 @@ def _means(scene: Scene) -> tuple[float, float, float]:
     )
 
 
-def _fit(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares, and how far each point is off where it is left out."""
-    inverse = np.linalg.pinv(x)
-    terms = inverse @ y
-    leverage = np.minimum(np.einsum("ij,ji->i", x, inverse), 0.95)
-    return terms, (y - x @ terms) / (1.0 - leverage)[:, np.newaxis]
+def _fit(
+    points: np.ndarray, y: np.ndarray, stretch: np.ndarray, with_splines: bool = True
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coefficients, weights of splines, and how far points are off where they are left out.
+
+    The last by S. Rippa (Adv. Comput. Math. 11 (1999) 193); splines without weight leave least
+    squares.
+    """
+    x = basis(points, POWERS)
+    count, terms = x.shape
+    nodes = points * stretch
+    kernel = splines(nodes, nodes) + SMOOTH * np.eye(count) if with_splines else np.eye(count)
+    inverse = np.linalg.inv(np.block([[kernel, x], [x.T, np.zeros((terms, terms))]]))
+    found = inverse[:, :count] @ y
+    left_out = found[:count] / np.diag(inverse)[:count, np.newaxis]
+    return found[count:], found[:count] * with_splines, left_out
+
+
+def _stretch(points: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Stretch with which points that are left out are best told by the others."""
+
+    def size(stretch: np.ndarray) -> float:
+        return _spread(_fit(points, y, stretch)[2])
+
+    best, factor = np.full(4, 3.0), 3.0
+    least = size(best)
+    while factor > 1.2:
+        before = least
+        for tried in np.exp(math.log(factor) * AROUND):
+            if (found := size(best * tried)) < least:
+                best, least = best * tried, found
+        if not least < before:
+            factor = math.sqrt(factor)
+    return best
 
 
 def _spread(values: np.ndarray) -> float:
-    return DOUBT * float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt(np.mean(values**2)))

@@ -130,9 +130,14 @@ def _drill(
     from percussion_model.analysis.identify.drill import drill_of
     from percussion_model.scene.hammers import hammer as hammer_of
     from percussion_model.scene.hammers import hammers
+    from percussion_model.scene.presets import scene_presets
+    from percussion_model.scene.rows import said_among
     from percussion_model.scene.scene import Scene
     from percussion_model.scene.text import read_setting
 
+    known = {*hammers(), *scene_presets()}
+    if hammer not in known and not Path(hammer).exists():
+        raise common.refusal(f"--hammer {hammer}: no scene file; {said_among(hammer, hammers())}")
     scene = hammer_of(hammer) if hammer in hammers() else Scene.from_toml(hammer)
     scene = common.with_bit(scene, bit)
     changes = dict(read_setting(text) for text in settings or ())

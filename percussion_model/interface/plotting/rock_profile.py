@@ -11,9 +11,9 @@ from percussion_model.analysis.identify.observation import RATE, SETTINGS
 from percussion_model.analysis.identify.profile import Profile
 from percussion_model.interface.plotting import style
 
-HOUR, RPM = 3600.0, 30.0 / np.pi
-# Nothing is drawn across a stretch without samples, of so many of their usual distances.
-GAP = 20.0
+HOUR = 3600.0
+# Hole without samples that is left open [m].
+GAP = 0.2
 # Colours of settings, by their share of what is usual in the hole.
 SHOWN = {"pressure": "pressure", "feed": "feed", "speed": "rotation"}
 
@@ -29,23 +29,21 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     figure = Figure(figsize=(10.0, 7.4), layout="constrained")
     axes = figure.subplots(1, 4, sharey=True, width_ratios=(1.3, 1.0, 1.0, 0.9))
     blue, red = style.LINE_COLOURS[0], style.LINE_COLOURS[1]
-    apart = np.diff(found.depth, prepend=found.depth[0])
-    behind_gap = apart > GAP * np.median(apart)
-    for ax, ends in zip(axes, (found.interval(), found.strength()), strict=False):
-        low, value, high = (np.where(behind_gap, np.nan, one) for one in ends)
-        ax.fill_betweenx(found.depth, 1e-6 * low, 1e-6 * high, color=blue, alpha=0.22, linewidth=0)
-        ax.plot(1e-6 * value, found.depth, color=blue)
+    depth, gaps = found.depth.copy(), np.flatnonzero(np.diff(found.depth) > GAP)
+    depth[gaps] = np.nan  # lines and bands are open where the log has nothing
+    for ax, (low, value, high) in zip(axes, (found.interval(), found.strength()), strict=False):
+        ax.fill_betweenx(depth, 1e-6 * low, 1e-6 * high, color=blue, alpha=0.22, linewidth=0)
+        ax.plot(1e-6 * value, depth, color=blue)
     axes[0].set_xlim(0.0, 1.15e-6 * float(np.quantile(found.interval()[2], 0.98)))
     axes[1].set_xlim(0.0, 1.15e-6 * float(np.quantile(found.strength()[2], 0.98)))
     if truth is not None:
-        axes[0].plot(1e-6 * truth, found.depth, color="black", linestyle="--", linewidth=1.0)
+        axes[0].plot(1e-6 * truth, depth, color="black", linestyle="--", linewidth=1.0)
     rate = HOUR * found.samples.signals[:, RATE]
     axes[2].plot(rate, found.depth, ".", color=style.RULE_COLOUR, markersize=1.6)
     axes[2].set_xlim(0.0, 1.1 * float(np.quantile(rate, 0.99)))
     usual = np.median(found.samples.settings, axis=0)
     for k, name in enumerate(SETTINGS):
-        shown = np.where(behind_gap, np.nan, found.samples.settings[:, k] / usual[k])
-        axes[3].plot(shown, found.depth, linewidth=0.9,
+        axes[3].plot(found.samples.settings[:, k] / usual[k], depth, linewidth=0.9,
                      color=style.LINE_COLOURS[k + 2], label=SHOWN[name])  # fmt: skip
     for ax in axes:
         for top in found.layers:
@@ -53,7 +51,7 @@ def draw_profile(found: Profile, title: str, truth: np.ndarray | None = None) ->
     style.label(axes[0], "crushing energy / efficiency [MJ/m³]", "depth [m]", "What the rate shows")
     style.label(axes[1], "strength [MPa]", "", "By the library's relation")
     style.label(axes[2], "rate [m/h]", "", "Log")
-    style.label(axes[3], "divided by the median [–]", "", "Settings")
+    style.label(axes[3], "by the median [–]", "", "Settings")
     axes[0].set_ylim(float(found.depth[-1]), float(found.depth[0]))
     handles = [
         Line2D([], [], color=blue, label="from the log"),
