@@ -217,7 +217,7 @@ def main(holes: int) -> None:
     """Print both campaigns and the time of an hour at 1 Hz."""
     stepped = cells(campaign(range(holes), steps=True))
     slow = cells(campaign(range(holes // 4), steps=False))
-    exact = cells(campaign(range(holes), steps=True, exact=True))
+    exact = cells(campaign(range(holes // 4), steps=True, exact=True))
     rows = [[what, stepped[what], exact[what], slow[what]] for what in stepped]
     heads = ["", "steps of rotation, pressure, feed", "the same, response known exactly",
              "one slow rotation"]  # fmt: skip

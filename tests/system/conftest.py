@@ -54,5 +54,5 @@ def two_way(fmus, tmp_path_factory):
 @pytest.fixture
 def brief(monkeypatch):
     """Short runs of the bench, for what does not hang on the motion."""
-    trials = tuple(replace(trial, duration=1.2) for trial in bench.STANDARD_RUNS)
+    trials = tuple(replace(trial, duration=0.8) for trial in bench.STANDARD_RUNS)
     monkeypatch.setattr(bench, "STANDARD_RUNS", trials)

@@ -219,11 +219,10 @@ def test_what_is_refused_leaves_nothing_unpacked(feed_control, tmp_path, monkeyp
     assert [one.name for one in tmp_path.iterdir()] == ["mine"]
 
 
-@pytest.mark.parametrize("name", ["Bücher", "a#b", "a b"])
-def test_fmus_run_whatever_the_folder_for_temporary_files_is_called(name, feed_control, tmp_path):
+def test_fmus_run_whatever_the_folder_for_temporary_files_is_called(feed_control, tmp_path):
     """In a process of its own: where it goes wrong, pythonfmu crashes."""
-    folder = tmp_path / name
-    folder.mkdir()
+    folder = tmp_path / "Bücher" / "a#b" / "a b"
+    folder.mkdir(parents=True)
     shutil.copy(feed_control, folder / "System.ssp")
     words = ["couple", "System.ssp", "--duration", "0.01", "--no-figures"]
     done = subprocess.run(

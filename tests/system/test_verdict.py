@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,6 +23,12 @@ def run_at(system, step, duration, parameters=None):
     return Coupling(system, parameters or {}).run(duration, step)
 
 
+@cache
+def verdict_at(system, step, duration):
+    """Of a run that several tests look at."""
+    return run_at(system, step, duration).verdict
+
+
 # Rows of docs/data/coupling_step.md: up to 2 ms the rate is right to 1.5 %, the shoulder as given.
 @pytest.mark.parametrize(
     ("step", "duration", "word"),
@@ -38,17 +45,17 @@ def run_at(system, step, duration, parameters=None):
     ],
 )
 def test_the_verdict_over_a_ladder_of_steps(feed_control, step, duration, word):
-    verdict = run_at(feed_control, step, duration).verdict
+    verdict = verdict_at(feed_control, step, duration)
     assert verdict.word == word, verdict.text
     assert verdict.is_bad == (word != "balanced")
 
 
 @pytest.mark.parametrize("step", [2.5e-3, 0.02, 0.5])
 def test_the_step_that_is_said_to_do_does(feed_control, step):
-    verdict = run_at(feed_control, step, 1.0).verdict
+    verdict = verdict_at(feed_control, step, 1.0)
     assert verdict.findings[0].signal == "string.shoulder_stiffness"
     assert verdict.step == 2e-3
-    assert run_at(feed_control, verdict.step, 0.5).verdict.word == "balanced"
+    assert verdict_at(feed_control, verdict.step, 0.5).word == "balanced"
 
 
 def test_a_stiff_shoulder_wants_a_shorter_step(feed_control):
