@@ -14,7 +14,7 @@ def page() -> str:
     rows = []
     for name, si in COLUMNS.items():
         units = [*UNITS[si], *SPELLED.get(si, {})]
-        without = f"; {USUAL[name]} if none is told" if name in USUAL else ""
+        without = f"; {USUAL[name]} if none is given" if name in USUAL else ""
         rows.append((f"`{name}`", ", ".join(NAMES[name]), ", ".join(units) + without))
     text = table(("column", "headings, in any case", "units"), rows)
     return f"# Headings and units of drilling logs\n\n{text}"
