@@ -82,6 +82,7 @@ REFUSED = {
     "no rate, no time": (without(0, 2), "row 1, column 1: found depth"),
     "no rate, no depth": (without(1, 2), "row 1, column 1: found time"),
     "never drills": (text_of(rows(120, 0.0)), "0 of 120 rows are left"),
+    "rows in reverse": (text_of(rows()[::-1]), "are the rows in reverse order"),
     "few rows": (text_of(rows(12)), "of 12 rows are left"),
     "all in a collar": (text_of(rows(40)), "collaring 40"),
     "thousands": (text_of(rows(), mark=";").replace("24.0", "1.024,0"), "column 4 .pressure."),

@@ -225,6 +225,15 @@ def test_the_lag_of_the_rate_is_found_and_told(holes):
     assert any(note.startswith(f"rate: {LAG} rows (") for note in told)
 
 
+def test_a_rate_in_a_wrong_unit_is_told(rigid, holes):
+    drill, _, table = rigid
+    hole, found = holes["slow"]
+    assert not any("is its unit right" in note for note in found.samples.notes)
+    columns = hole.log.columns | {"rate": 15.0 * hole.log.columns["rate"]}
+    other = identify(replace(hole.log, columns=columns), drill, ROCK, table=table)
+    assert any("what this hammer drills in usual rock" in note for note in other.samples.notes)
+
+
 def test_at_one_rotation_the_interval_says_what_it_cannot_know(holes):
     """The share of fresh rock is held with its prior, and its doubt is in the interval."""
     (_, steps), (hole, slow) = holes["steps"], holes["slow"]

@@ -185,8 +185,9 @@ def test_a_calibration_fits(shown, tmp_path):
 
 @pytest.mark.parametrize("width", [34, 47, 80, 200])
 @pytest.mark.parametrize("keys", [1, 2])
-def test_a_table_keeps_all_its_words_at_any_width(width, keys, monkeypatch, capsys):
-    table = Table(title="A table with numbers, names and words")
+@pytest.mark.parametrize("pad_edge", [True, False])
+def test_a_table_keeps_all_its_words_at_any_width(width, keys, pad_edge, monkeypatch, capsys):
+    table = Table(title="A table with numbers, names and words", pad_edge=pad_edge)
     columns = [("case", True), ("solver", True), *((f"n{k}", True) for k in range(7))]
     columns += [("what was\nfound", False), ("and why", False)]
     for name, whole in columns:

@@ -45,6 +45,8 @@ def test_python_takes_the_names_of_the_command_line():
         assert Scene.from_toml(name) == Scene.from_toml(path)
     with pytest.raises(SceneError, match="nosuch: there is no such scene file, and no preset"):
         Scene.from_toml("nosuch")
+    with pytest.raises(SceneError, match=r"percussion new dth5\.toml --hammer dth5"):
+        Scene.from_toml("dth5")
 
 
 @pytest.mark.parametrize(

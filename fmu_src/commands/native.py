@@ -57,6 +57,7 @@ def native(
                 raise common.refusal(f"{part.name}: is no hammer: omit --rock and --bit")
             _write_part(part, output, names, flat_names)
             return
+        _refuse_misspelt_part(scene)
         file, chosen = options.baked_scene(scene, scene_option, rock, bit)
         files = native_files(file, output)
         for path in files.values():
@@ -70,6 +71,19 @@ def native(
             with progress(f"building the FMU of FMI {version}"):
                 guid = build_native(chosen, path, version, made, flat_names)
             typer.echo(f"{path} {{{guid}}}: {state_of(path, before)}, {source}")
+
+
+def _refuse_misspelt_part(scene: Path | None) -> None:
+    """Say which part was meant, if a name is near one and is no scene."""
+    from fmu_src.parts.build import PARTS
+    from percussion_model.scene.presets import scene_presets
+    from percussion_model.scene.rows import nearest
+
+    name = str(scene or "")
+    known = [part.name for part in PARTS.values() if part.law is not None]
+    meant = nearest(name, known) if name and name not in scene_presets() else ""
+    if meant and not Path(name).exists():
+        raise common.refusal(f"{name}: is no scene and no part: did you mean {meant}?")
 
 
 def _write_part(part: PartTable, output: Path, names: Mapping[str, str], flat: bool) -> None:

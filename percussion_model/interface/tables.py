@@ -148,6 +148,7 @@ def _part(table: Table, places: list[int], widths: list[int]) -> Table:
     for place, width in zip(places, widths, strict=True):
         column = copy(table.columns[place])
         column.width = width
+        column._index = len(part.columns)  # the last one has no room at its right
         part.columns.append(column)
     if places != list(range(len(places))):
         part.title = None

@@ -125,6 +125,8 @@ def test_a_part_of_a_system_comes_in_both_versions(built_library, tmp_path, caps
     assert {path.name for path in tmp_path.iterdir()} == {"RigFeed.fmu", "RigFeed-fmi3.fmu"}
     assert percussion("native", "RigFeed", "--rock", "granite", "-o", tmp_path) == 2
     assert "RigFeed: is no hammer" in capsys.readouterr().err
+    assert percussion("native", "RigFed", "-o", tmp_path) == 2
+    assert "did you mean RigFeed?" in capsys.readouterr().err
 
 
 def test_of_two_at_once_one_compiles_and_the_other_waits(linked, tmp_path, capsys):

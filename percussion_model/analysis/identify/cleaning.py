@@ -166,9 +166,11 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
         alive &= good
     if len(found.depth) < FEWEST:
         told = ", ".join(f"{rule} {count}" for rule, count in found.dropped.items())
+        falls = np.mean(np.diff(depth[np.isfinite(depth)]) < 0.0) > 0.5 if total > 1 else False
         raise IdentifyError(
             f"{log.name}: {len(found.depth)} of {total} rows are left, at least {FEWEST} are "
             f"wanted; dropped: {told or 'none'}"
+            + ("; depth falls from row to row: are the rows in reverse order?" if falls else "")
         )
     return found
 

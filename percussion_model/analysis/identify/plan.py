@@ -57,8 +57,10 @@ class Change:
         return math.exp(SURE * self.spread) - 1.0
 
 
-def plan(profile: Profile) -> list[Change]:
+def plan(profile: Profile, table: Table | None = None) -> list[Change]:
     """Return changes by what they tell, the best first; no change is among them.
+
+    Of a table that reaches beyond the settings of the log, where one is given.
 
     By Fisher's information of the next metre: half of it as now, half with one setting changed,
     added to what is known behind the last sample.
@@ -69,16 +71,17 @@ def plan(profile: Profile) -> list[Change]:
     step = np.diff(profile.depth)
     spacing = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else rate
     count = METRE / max(spacing, 1e-4)
-    none = _after(profile, [now], [count], given)
+    table = table or profile.table
+    none = _after(profile, table, [now], [count], given)
     found = [Change("", 1.0, 0.0, float(none[Q]), {})]
     for k, name in enumerate(SETTINGS):
         for share in SHARES[name]:
             other = now.copy()
             other[k] *= share
-            if not profile.table.contains(other[np.newaxis])[0]:
+            if not table.contains(other[np.newaxis])[0]:
                 continue
             both = [(1.0 - CHANGED) * count, CHANGED * count]
-            spread = _after(profile, [now, other], both, given)
+            spread = _after(profile, table, [now, other], both, given)
             less = {
                 one: float(spread[j] / none[j])
                 for j, one in enumerate(UNKNOWNS)
@@ -89,15 +92,19 @@ def plan(profile: Profile) -> list[Change]:
 
 
 def _after(
-    profile: Profile, settings: Sequence[np.ndarray], counts: Sequence[float], given: np.ndarray
+    profile: Profile,
+    table: Table,
+    settings: Sequence[np.ndarray],
+    counts: Sequence[float],
+    given: np.ndarray,
 ) -> np.ndarray:
     """Standard deviations of the unknowns after samples at settings."""
     logs = np.log(settings)
-    slopes = slopes_of(profile.table, profile.mean[-1], np.array(settings))[:, given]
+    slopes = slopes_of(table, profile.mean[-1], np.array(settings))[:, given]
     own = profile.noise.values() ** 2 / np.array(counts)[:, np.newaxis]
     own[:, RATE] += profile.noise.varies**2
     matrix = np.concatenate(slopes)
-    errors = np.diag(profile.table.errors[given] ** 2)
+    errors = np.diag(table.errors[given] ** 2)
     total = matrix @ profile.covariance @ matrix.T + np.kron(alike(logs), errors)
     total += np.diag(own[:, given].ravel())
     gain = np.linalg.solve(total, matrix @ profile.covariance).T

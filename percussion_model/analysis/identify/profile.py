@@ -51,6 +51,8 @@ MANY, FEW = 500, 80
 # Rock from place to place, by the logarithm of its rate: by samples of a block, of which there have
 # to be so many pairs at like settings; what is assumed without, at least, and at most.
 BLOCK, FEWEST_STEPS, VARIES, LEAST_VARIES, MOST_VARIES = 20, 8, 0.01, 0.003, 0.1
+# A rate so many times what is usual, or less by that, is likely in another unit than is said.
+ODD = 10.0
 # Mean absolute deviation of a normal variable, by its standard deviation.
 MAD = 0.6745
 
@@ -157,7 +159,6 @@ def identify(
     rock: str | None = None,
     collaring: float = COLLARING,
     table: Table | None = None,
-    room: Mapping[str, tuple[float, float]] | None = None,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> Profile:
     """Return the rock along a hole.
@@ -173,8 +174,6 @@ def identify(
         Hole that is left out at its collar [m].
     table : Table, optional
         One made before, whose range must hold the log's.
-    room : mapping of tuple, optional
-        Shares of the least and the greatest pressure and feed that the table is to reach.
     progress : callable, optional
         Called with words and the share that is done.
 
@@ -191,7 +190,7 @@ def identify(
     samples = clean(log, own, collaring)
     prior = prior_of(scene, rock)
     if table is None:
-        wanted = _ranges(samples, prior, room or {})
+        wanted = _ranges(samples, prior, {})
         size = FEW if scene["effects.string"] else MANY
         table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s), size)
     samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
@@ -202,9 +201,39 @@ def identify(
             f"table, at least {FEWEST} are wanted"
         )
     samples.notes += [said] * bool(said)
+    samples.notes += _odd_rate(samples, table, prior)
     noise = noise_of(samples, table, prior)
     found = RockFilter(table, prior.mean, prior.spread, noise)
     return _along(samples, found, prior, noise, scene, tell)
+
+
+def _odd_rate(samples: Samples, table: Table, prior: Prior) -> list[str]:
+    """Say so if rates are far from what the hammer drills in the rock of the prior."""
+    unknowns = np.broadcast_to(prior.mean, (len(samples.depth), len(UNKNOWNS)))
+    usual = np.exp(table.predict(unknowns, samples.settings)[:, RATE])
+    times = float(np.nanmedian(samples.signals[:, RATE] / usual))
+    if 1.0 / ODD < times < ODD:
+        return []
+    return [f"rate: {times:.2g} times what this hammer drills in usual rock: is its unit right?"]
+
+
+def table_with_room(
+    profile: Profile,
+    drill: Drill,
+    room: Mapping[str, tuple[float, float]],
+    progress: Callable[[float], None] | None = None,
+) -> Table:
+    """Return a table that reaches beyond the settings of a log.
+
+    Parameters
+    ----------
+    drill : Drill
+        At the pressure of the log.
+    room : mapping of tuple
+        Shares of the least and the greatest pressure and feed.
+    """
+    ranges = _ranges(profile.samples, profile.prior, room)
+    return tabulate(drill.scene, drill.changes, ranges, progress, FEW)
 
 
 def part_filter(profile: Profile, drill: Drill) -> RockFilter:

@@ -68,6 +68,7 @@ def identify(
     from percussion_model.analysis.identify.plan import ROOM
     from percussion_model.analysis.identify.plan import plan as plan_next
     from percussion_model.analysis.identify.profile import identify as tell_rock
+    from percussion_model.analysis.identify.profile import table_with_room
     from percussion_model.interface.drill_log import read_log
     from percussion_model.interface.progress import progress
 
@@ -89,10 +90,12 @@ def identify(
     )  # fmt: skip
     common.tell_of_compiling(drill.scene.solver_name)
     with progress("reading the log") as report:
-        found = tell_rock(
-            read, drill, rock, collaring, room=ROOM if plan else None, progress=report
-        )
-    changes = plan_next(found) if plan else []
+        found = tell_rock(read, drill, rock, collaring, progress=report)
+        changes = []
+        if plan:
+            here = drill.at_pressure_of(read)[0]
+            wide = table_with_room(found, here, ROOM, lambda s: report("runs a wider table", s))
+            changes = plan_next(found, wide)
     summary = found.summary()
     if plan:
         summary["plan"] = [

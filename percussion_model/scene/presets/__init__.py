@@ -48,7 +48,17 @@ def scene_file(named: Path) -> Path:
     SceneError
         If it is a plain name, and neither.
     """
-    return _file(named, "scene", scene_presets)
+    from percussion_model.scene.hammers import hammers  # no scene that is there needs it
+
+    try:
+        return _file(named, "scene", scene_presets)
+    except SceneError:
+        if named.name in hammers():
+            raise SceneError(
+                f"{named}: is a hammer, and no scene: `percussion new {named}.toml --hammer "
+                f"{named}` writes one"
+            ) from None
+        raise
 
 
 def system_file(named: Path) -> Path:
