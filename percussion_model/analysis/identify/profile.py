@@ -53,6 +53,8 @@ MANY, FEW = 500, 80
 BLOCK, FEWEST_STEPS, VARIES, LEAST_VARIES, MOST_VARIES = 20, 8, 0.01, 0.003, 0.1
 # A rate so many times what is usual, or less by that, is likely in another unit than is said.
 ODD = 10.0
+# A table reaches as far as the settings of the log.
+NO_ROOM: Mapping[str, tuple[float, float]] = {}
 # Mean absolute deviation of a normal variable, by its standard deviation.
 MAD = 0.6745
 
@@ -190,7 +192,7 @@ def identify(
     samples = clean(log, own, collaring)
     prior = prior_of(scene, rock)
     if table is None:
-        wanted = _ranges(samples, prior, {})
+        wanted = _ranges(samples, prior)
         size = FEW if scene["effects.string"] else MANY
         table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s), size)
     samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
@@ -246,7 +248,7 @@ def part_filter(profile: Profile, drill: Drill) -> RockFilter:
 
 
 def _ranges(
-    samples: Samples, prior: Prior, room: Mapping[str, tuple[float, float]]
+    samples: Samples, prior: Prior, room: Mapping[str, tuple[float, float]] = NO_ROOM
 ) -> dict[str, tuple[float, float]]:
     found = {}
     for name, (low, high) in zip(("pressure", "feed"), ranges_of(samples), strict=True):

@@ -48,11 +48,11 @@ def scene_file(named: Path) -> Path:
     SceneError
         If it is a plain name, and neither.
     """
-    from percussion_model.scene.hammers import hammers  # no scene that is there needs it
-
     try:
         return _file(named, "scene", scene_presets)
     except SceneError:
+        from percussion_model.scene.hammers import hammers  # no scene that is there needs it
+
         if named.name in hammers():
             raise SceneError(
                 f"{named}: is a hammer, and no scene: `percussion new {named}.toml --hammer "
