@@ -109,6 +109,14 @@ def opened(built, folder, use, fragment="", width=1280):
     return asyncio.run(visit())
 
 
+async def follow(one, link):
+    """Change the address to another link, and wait until the page has taken it up."""
+    await one.ask(
+        "new Promise(done => {addEventListener('hashchange', () => done(), {once: true});"
+        f" location.hash = '{link}'}})"
+    )
+
+
 def random_settings(seed):
     """Names and values of a scene: as a link of the page, and as a scene of the package."""
     chance = random.Random(seed)
@@ -133,7 +141,7 @@ def test_numbers_are_those_of_settled(built, tmp_path):
     async def use(one):
         shown = []
         for link, _ in settings:
-            await one.ask(f"location.hash = '{link}'; new Promise(done => setTimeout(done, 20))")
+            await follow(one, link)
             await one.until(WITH_ERRORS)
             rate = await one.ask(
                 "['rate', 'numerical'].map(id => document.getElementById(id).textContent).join('|')"
@@ -226,7 +234,7 @@ def test_a_scene_of_the_user_is_begun_with_shared_and_written(name, built, tmp_p
         link = await one.ask("explorer.state.scene.link()")
         for key, value in changes.items():
             link += f"&{key}={value}"
-        await one.ask(f"location.hash = '{link}'; new Promise(done => setTimeout(done, 20))")
+        await follow(one, link)
         await one.until(WITH_ERRORS)
         forms = await one.ask("['toml', 'link'].map(form => explorer.state.scene[form]())")
         return before, await one.ask(MEANS), forms
@@ -376,7 +384,7 @@ def test_a_jam_and_the_work_of_a_great_feed_are_said(built, tmp_path):
         await one.until("document.getElementById('notes').textContent")
         jammed = await one.ask(texts)
         link = "hammer=dth4&bit=dth-115&rock=kuru-granite&feed.force=100000"
-        await one.ask(f"location.hash = '{link}'; new Promise(done => setTimeout(done, 20))")
+        await follow(one, link)
         await one.until(SHOWN)
         return jammed, await one.ask(texts)
 

@@ -379,7 +379,8 @@ function listen() {
   part("result").onclick = () => part("result").classList.toggle("open");
   let resizing;
   window.addEventListener("resize", () => { clearTimeout(resizing); resizing = setTimeout(redraw, 80); });
-  window.addEventListener("hashchange", () => start(location.hash));
+  // The address is written a while after a change: by now it may be another than the one that was asked.
+  window.addEventListener("hashchange", event => start(new URL(event.newURL).hash));
   document.addEventListener("keydown", event => {
     if (event.key === " " && event.target === document.body) { event.preventDefault(); player.play(!player.playing); }
   });
