@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -19,8 +21,12 @@ from percussion_model import Scene, SceneError, SimulationError, settled
 from percussion_model.analysis.study import Study, grid, study, table, workers
 from percussion_model.analysis.study.response import COMPUTING, KINDS, run_points
 from percussion_model.analysis.study.store import PARTS, PLAN
+from percussion_model.analysis.study.variants import PLAIN_GROUPS
 from percussion_model.engine import solver as engine
 from percussion_model.interface.cli import INTERRUPTED, _guarded, app
+from percussion_model.scene import contradictions
+from percussion_model.scene.hammers import with_chambers
+from percussion_model.scene.parameters import parameter_table
 from percussion_model.simulation.files import ResultError, to_json
 from percussion_model.solvers import sources
 
@@ -66,6 +72,41 @@ def test_what_goes_wrong_at_a_point_is_recorded_and_stops_nothing():
     assert "rock.unloading_ratio = 0.5: must be a number above 1" in failures[1]
     assert np.isnan(rows["rate_of_penetration"][1])
     assert np.isfinite(rows["rate_of_penetration"][[0, 2]]).all()
+
+
+@pytest.mark.parametrize(
+    ("scene", "key", "values"),
+    [
+        (SCENE, "drive.force", [6000.0, 5000.0, -1.0, 7000.0]),
+        (Scene(), "rock.loading_stiffness", [7e8, 3e8, 7e8]),  # which tables follow from
+        (Scene(), "solver.cells", [10.0, 12.0]),
+        (with_chambers("dth3", 1.8e6), "pneumatic.pressure", [1.8e6, 2.2e6, 1.5e6]),
+    ],
+)
+def test_points_one_after_the_other_are_those_of_their_own_scenes(scene, key, values):
+    rows, failures = run_points(scene, (key,), np.array([values]).T, 1e-4, 40, 1e-2)
+    for k, value in enumerate(values):
+        (row,), (failure,) = run_points(scene, (key,), np.array([[value]]), 1e-4, 40, 1e-2)
+        assert failures[k] == failure
+        for name in set(rows.dtype.names) - {"wall_time"}:
+            np.testing.assert_array_equal(rows[name][k], row[name])
+
+
+def test_plain_numbers_decide_no_contradiction_and_no_solver():
+    """Rules that look at one would have to be asked at each point."""
+    seen = set(re.findall(r"\bv\.(\w+)", inspect.getsource(contradictions)))
+    for choice in (Scene.solver_name.fget, Scene._against_modes.func, Scene.motor_stalls.fget):
+        seen |= {
+            f"{a}_{b}" for a, b in re.findall(r"self\.(\w+)\.(\w+)", inspect.getsource(choice))
+        }
+    plain = {
+        row.key.replace(".", "_")
+        for row in parameter_table()
+        if row.kind == "number" and row.key.partition(".")[0] in PLAIN_GROUPS
+    }
+    assert {"loss_time", "run_settle", "effects_loss"} <= seen
+    assert "feed_force" in plain
+    assert not seen & plain
 
 
 @pytest.fixture(scope="module")

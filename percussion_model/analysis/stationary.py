@@ -325,7 +325,44 @@ def settled(
         raise SceneError(f"most_time = {most_time!r} s: must be above 0 s")
     began = time.thread_time()
     simulation = Simulation(scene, record_events=False)
-    blows = simulation.blows
+    found = settle(simulation, tolerance, most_blows, scatter, began + most_time, progress)
+    if not error_estimate:
+        return found
+    # before other runs make this one longer; a study of thousands would pay for them
+    start = float(found.counted["time"][0]) if len(found.counted) else 0.0
+    found.warnings.extend(warnings_of_motion(simulation.result(start)))
+    others = _other_motions(simulation, tolerance, most_blows, scatter, most_time)
+    found = replace(found, others=others)
+    if math.isfinite(found.rate_of_penetration) and not scene.is_undamped:
+        settling = JUDGED_SHARE if found.order else SETTLING_SHARE
+        found = replace(found, grid_errors=_grid_errors(simulation, settling))
+    return found
+
+
+def settle(
+    simulation: Simulation,
+    tolerance: float,
+    most_blows: int,
+    scatter: float,
+    deadline: float,
+    progress: Callable[[float], None] | None = None,
+) -> Settled:
+    """Let a simulation that has not begun run until its blows repeat, as `settled` does.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    tolerance, most_blows, scatter, progress
+        See `settled`.
+    deadline : float
+        As `time.thread_time` tells it [s].
+
+    Returns
+    -------
+    Settled
+        Without errors of the grid.
+    """
+    scene = simulation.scene
     slowest = MOTOR_SETTLES * scene["rotation.response"] if scene.motor_stalls else 0.0
 
     def made(kind: str, order: int, rate: float, error: float, multiplier: float) -> Settled:
@@ -333,25 +370,14 @@ def settled(
         if order and not advances(cycle).any():
             rate = error = 0.0
         values = kind, order, rate, error, multiplier, cycle, blows, *times
-        found = Settled(*values, scene.is_undamped, hole_diameter=scene.hole_diameter)
-        if not error_estimate:
-            return found
-        # before other runs make this one longer; a study of thousands would pay for them
-        start = float(found.counted["time"][0]) if len(found.counted) else 0.0
-        found.warnings.extend(warnings_of_motion(simulation.result(start)))
-        others = _other_motions(simulation, tolerance, most_blows, scatter, most_time)
-        found = replace(found, others=others)
-        if math.isfinite(rate) and not scene.is_undamped:
-            settling = JUDGED_SHARE if order else SETTLING_SHARE
-            found = replace(found, grid_errors=_grid_errors(simulation, settling))
-        return found
+        return Settled(*values, scene.is_undamped, hole_diameter=scene.hole_diameter)
 
     asked = request_for(tolerance, most_blows, slowest)
     found = asked.view(REQUEST)[0]
     if scatter:
         found["enough"] = FEWEST_SCATTERED
     while True:
-        simulation.settle(asked, progress, began + most_time)
+        simulation.settle(asked, progress, deadline)
         blows = simulation.blows
         if found["verdict"] == Verdict.STALLED:
             return made("stalled", 0, math.nan, math.nan, math.nan)

@@ -61,3 +61,14 @@ def image_of(numbers: Numbers) -> np.ndarray:
     words = [np.array(counts, np.int64).tobytes(), _WORDS.pack(*values)]
     words += [np.ascontiguousarray(one, np.float64).tobytes() for one in rows]
     return np.frombuffer(bytearray(b"".join(words)), np.int64)
+
+
+def words_in_image(numbers: Numbers, field: str) -> list[int]:
+    """Words of an image of a scene's numbers that hold a field of `SCENE_NUMBERS`."""
+    first = COUNTS + len(numbers.rod_counts)
+    words = [first + AT[field]]
+    if dict(PRESSED).get(int(numbers.values.effects_drive), AT["drive_force"]) == AT[field]:
+        sections = len(numbers.piston) + len(numbers.bit) + len(numbers.rod_sections)
+        rows = SECTION * sections + JOINT * len(numbers.joints)
+        words.append(first + VALUES + rows + Own.PRESSURE)
+    return words

@@ -157,24 +157,19 @@ class EngineSolver(Solver):
         self._blows: np.ndarray | None = None
         self._events: np.ndarray | None = None
         self._blows_at = self._events_at = 0
+        self._facts, self._key_numbers = np.zeros(FACTS), np.zeros(KEY_NUMBERS)
+        self._facts_at, self._key_at = self._facts.ctypes.data, self._key_numbers.ctypes.data
         numbers = numbers_of(scene)
         self._image = image_of(numbers)
-        if refused := self._refusal(self._image):
-            raise SceneError(refused)
-        self._motion = self._make_motion(numbers)
-        self._start, self._array_shapes = self._motion.moving(), self._motion.shapes()
-        self._base = int(self._motion.base)
-        self._par = self._motion.parameters(self.PAR)
-        head = self._motion.head
-        self.time_step = float(head["time_step"]) or None
-        self.wave_speed_error = float(head["wave_speed_error"])
-        self.operator_bytes = self._motion.table_bytes
+        self._image_numbers, self._image_at = self._image.view(np.float64), self._image.ctypes.data
+        bars = numbers.piston.tobytes(), numbers.bit.tobytes(), numbers.values.piston_model
+        self._bars_key: tuple[Any, ...] = (self.name, *bars)
+        self._set_up()
         words = words_of(self.STATE)
         self._blow_word, self._event_word = words["n_blows"], words["n_events"]
         self._names = self._elastic_bars()
         self._grids: dict[str, Grid] = {}
         self._shapes: dict[tuple[str, int], np.ndarray] = {}
-        self._facts = np.zeros(FACTS)
         # what `sample` works in
         self._spare = State(self.STATE, self._array_shapes, RECORD)
         self._seen, self._done = np.zeros(1, READING), np.zeros(1, np.int64)
@@ -193,14 +188,51 @@ class EngineSolver(Solver):
         fault = self._entries.refuse(image.ctypes.data, facts.ctypes.data)
         return fault_text(fault, facts) if fault else ""
 
-    def _make_motion(self, numbers: Any) -> Motion:
-        """Motion with tables of its own, or with those of one that was made before."""
-        key_numbers = np.zeros(KEY_NUMBERS)
-        count = self._entries.table_key(self._image.ctypes.data, key_numbers.ctypes.data)
-        if count == 0:
-            return Motion(self._entries, self._image)
-        bars = numbers.piston.tobytes(), numbers.bit.tobytes(), numbers.values.piston_model
-        key = (self.name, *bars, key_numbers.tobytes())
+    def _set_up(self) -> None:
+        """Make the motion of the image."""
+        if refused := self._refusal(self._image):
+            raise SceneError(refused)
+        self._like = self._find_like()
+        motion = self._motion = Motion(self._entries, self._image, self._like)
+        self._base, self._array_shapes = motion.base, motion.shapes()
+        head = motion.head
+        self.time_step = float(head["time_step"]) or None
+        self.wave_speed_error = float(head["wave_speed_error"])
+        self.operator_bytes = motion.table_bytes
+
+    def vary(self, changes: list[tuple[int, float]]) -> bool:
+        """Compute another scene, which differs in some numbers of the image; states go on no more.
+
+        Parameters
+        ----------
+        changes : list of (int, float)
+            Words of the image, as `words_in_image` tells them, and values in SI units.
+
+        Returns
+        -------
+        bool
+            False if the solver cannot be set up for it.
+        """
+        for word, value in changes:
+            self._image_numbers[word] = value
+        if self._entries.refuse(self._image_at, self._facts_at):
+            return False
+        if self._like is not None and self._find_like() is self._like:
+            # what else is known of a motion follows from its tables
+            self._motion = Motion(self._entries, self._image, self._like)
+            self._base = self._motion.base
+            return True
+        self.__dict__.pop("cells", None)
+        self._shapes.clear()
+        self._set_up()
+        return True
+
+    def _find_like(self) -> Motion | None:
+        """A motion whose tables are those of the image; None where motions share none."""
+        self._key_numbers[:] = 0.0
+        if self._entries.table_key(self._image_at, self._key_at) == 0:
+            return None
+        key = (*self._bars_key, self._key_numbers.tobytes())
         with _keeping:
             like = _kept.get(key)
         if like is None:
@@ -209,7 +241,7 @@ class EngineSolver(Solver):
                 while len(_kept) >= MOST_KEPT:
                     del _kept[next(iter(_kept))]
                 _kept[key] = like
-        return Motion(self._entries, self._image, like)
+        return like
 
     def _elastic_bars(self) -> list[str]:
         """Names of the bars that have cells."""
@@ -236,7 +268,7 @@ class EngineSolver(Solver):
 
     def new_state(self) -> State:
         """State at time zero."""
-        return State(self.STATE, self._array_shapes, RECORD, self._start)
+        return State(self.STATE, self._array_shapes, RECORD, self._motion.moving())
 
     def time(self, state: State) -> float:
         """Time up to which the state is committed [s]."""

@@ -104,6 +104,31 @@ def numbers_over(blows: np.ndarray) -> dict[str, float]:
     return found | {name: _greatest(blows[name]) for name in _GREATEST}
 
 
+def numbers_of_each(blows: np.ndarray) -> dict[str, np.ndarray]:
+    """`numbers_over` of each blow alone.
+
+    Parameters
+    ----------
+    blows : ndarray of BLOW, shape (n,)
+
+    Returns
+    -------
+    dict of ndarray, shape (n,)
+    """
+    columns = dict(zip(_SUMMED, _columns(blows), strict=True))
+    found = {name: columns[column] for name, column in _MEANS.items()}
+    for name in _OF_COMPONENTS:
+        found[name] = np.where(found[name] == 0.0, math.nan, found[name])
+    found["blow_frequency"] = 1.0 / found["blow_period"]
+    for name, (column, by) in RATIOS.items():
+        nothing, known = np.full(len(blows), math.nan), columns[by] > 0.0
+        found[name] = np.divide(columns[column], columns[by], out=nothing, where=known)
+    greatest = {name: blows[name] for name in _GREATEST}
+    return found | {
+        name: np.where(np.isfinite(values), values, math.nan) for name, values in greatest.items()
+    }
+
+
 def by_volume(numbers: Mapping[str, float], diameter: float | None) -> dict[str, float]:
     """Specific energy of a hole: `energy_per_advance` by its area, or the error of both.
 

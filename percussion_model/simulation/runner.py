@@ -72,6 +72,11 @@ class Runner:
         self.solver.advance(trial, t, self._blow_room, self._event_room, self.record_events)
         self.solver.read(trial, t, np.zeros(1, READING))
 
+    def begin_again(self) -> None:
+        """Go back to time zero of what the solver computes now, with nothing kept."""
+        self._state = self.solver.new_state()
+        self._time = self.wall_time = 0.0
+
     @property
     def time(self) -> float:
         """Present time [s]."""
@@ -153,7 +158,7 @@ class Runner:
             If the run cannot continue, or comes to the deadline.
         """
         began, one = time.perf_counter(), asked.view(REQUEST)[0]
-        if self._settling is None:
+        if self._settling is None or len(self._settling) != one["most"]:
             self._settling = np.zeros(one["most"], BLOW)
         # in pieces that depend on the scene alone, so that it can be given up
         piece = self.solver.time_of_steps(CELL_STEPS)

@@ -94,6 +94,11 @@ class Simulation(Runner):
         self._blows: tuple[np.ndarray, ...] = ()  # bytes of the rows
         self._events: tuple[np.ndarray, ...] = ()
 
+    def begin_again(self) -> None:
+        """As in `Runner`."""
+        super().begin_again()
+        self._settled_position, self._blows, self._events = math.nan, (), ()
+
     def _advance_solver(self, t: float) -> None:
         settle = self.scene.run.settle
         if self._time <= settle <= t and math.isnan(self._settled_position):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from percussion_model.analysis.stationary import Settled, settled
+from percussion_model.analysis.stationary import MOST_TIME, Settled, settle, settled
 from percussion_model.analysis.study.points import whole_number
+from percussion_model.analysis.study.variants import Variants
 from percussion_model.scene.scene import Scene
 from percussion_model.simulation.interruption import interruptible
-from percussion_model.simulation.means import numbers_over
+from percussion_model.simulation.means import numbers_of_each, numbers_over
 from percussion_model.solvers.sources import SOLVING
 
 # Makes a number of a point, a column of a user's own.
@@ -30,6 +32,7 @@ COMPUTING = (
     "analysis/stationary.py",
     "analysis/study/points.py",
     "analysis/study/response.py",
+    "analysis/study/variants.py",
 )
 
 # What a study keeps of each point: name, and unit.
@@ -87,33 +90,60 @@ def run_points(
 
     metrics = metrics or {}
     rows, failures = np.zeros(len(values), row_type(metrics)), []
+    variants: Variants | None = None
+
+    def run(point: list[float]) -> Settled:
+        nonlocal variants
+        if variants and (simulation := variants.simulation(point)):
+            deadline = time.thread_time() + MOST_TIME
+            return settle(simulation, tolerance, most_blows, scatter, deadline)
+        changes = {k: whole_number(k, value) for k, value in zip(keys, point, strict=True)}
+        chosen = scene.replace(**changes)
+        found = settled(chosen, tolerance, most_blows, scatter=scatter)
+        variants = variants or Variants(chosen, keys)
+        return found
+
+    single: list[tuple[int, np.ndarray]] = []  # points whose blows are all alike, and that blow
     with threadpool_limits(1):
-        for row, point in zip(rows, values.tolist(), strict=True):
-            changes = {k: whole_number(k, value) for k, value in zip(keys, point, strict=True)}
+        for k, (row, point) in enumerate(zip(rows, values.tolist(), strict=True)):
             try:
-                chosen = scene.replace(**changes)
                 with interruptible():
-                    found = settled(chosen, tolerance, most_blows, scatter=scatter)
+                    found = run(point)
                     _fill(row, found)
+                    if found.order == 1:
+                        single.append((k, found.cycle))
+                    else:
+                        means = numbers_over(found.counted)
+                        _fill_means(row, means | {"blow_period": found.blow_period})
                 failures.append(_add_metrics(row, metrics, found))
             except Exception as error:
                 for name in (*FOUND, *metrics):
                     row[name] = math.nan
                 row["kind"] = KINDS.index("failed")
                 failures.append(f"{type(error).__name__}: {error}")
+    if single:
+        places, blows = zip(*single, strict=True)
+        chosen = rows[list(places)]
+        _fill_means(chosen, numbers_of_each(np.concatenate(blows)))
+        rows[list(places)] = chosen
     return rows, failures
 
 
 def _fill(row: Any, found: Settled) -> None:
+    """What is not a mean over blows."""
     row["kind"] = KINDS.index(found.kind)
     row["order"], row["blows"] = found.order, len(found.blows)
     row["wall_time"] = found.wall_time
-    for name, value in numbers_over(found.counted).items():
-        if name in FOUND:
-            row[name] = value
     row["rate_of_penetration"] = found.rate_of_penetration
     row["rate_of_penetration_error"] = found.rate_of_penetration_error
-    row["blow_period"], row["multiplier"] = found.blow_period, found.multiplier
+    row["multiplier"] = found.multiplier
+
+
+def _fill_means(rows: Any, numbers: Mapping[str, Any]) -> None:
+    """Means over blows: of a row, or of several."""
+    for name, values in numbers.items():
+        if name in FOUND:
+            rows[name] = values
 
 
 def row_type(metrics: Mapping[str, Metric]) -> np.dtype:
