@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from percussion_model.physics.elementary import cos_and_sin, exp, power_of_two
-from percussion_model.physics.kernel import kernel, plain
+from percussion_model.physics.kernel import inlined, kernel, plain
 from percussion_model.solvers.modal.damped import Pairs, damped_pairs
 from percussion_model.solvers.modal.lanes import WIDTH
 from percussion_model.solvers.modal.records import (
@@ -142,10 +142,10 @@ def _go(square, decay, h):
     return a, b, v, d
 
 
-@kernel
-def _view(square, decay, one, other, h):
-    """What a pair tells after `h`, by Q and V, of what two rows tell now by Q and V."""
-    qq, qv, vq, vv = _go(square, decay, h)
+@inlined
+def _view(go, one, other):
+    """What a pair tells after a move, by Q and V, of what two rows tell now by Q and V."""
+    qq, qv, vq, vv = go[0], go[1], go[2], go[3]
     return (
         one[0] * qq + one[1] * vq,
         one[0] * qv + one[1] * vv,
@@ -168,27 +168,63 @@ def _fill_goes(square, decay, tick, move):
 
 
 @kernel
-def _fill_views(square, decay, tick, ends, views):
+def _fill_views(move, ends, views):
     """Fill the table of what a law's pairs tell of the rock end later."""
-    for k in range(len(square)):
+    for k in range(ends.shape[1]):
         low, speed = ends[End.LOW : End.LOW + 2, k], ends[End.SPEED : End.SPEED + 2, k]
         for level in range(views.shape[0]):
-            view = _view(square[k], decay[k], low, speed, tick * power_of_two(level))
+            view = _view(move[level, :, k], low, speed)
             for row in range(4):
                 views[level, row, k] = view[row]
 
 
 @kernel
-def _fill_scans(square, decay, tick, ends, one, other, scans):
-    """Fill a table of what two of a law's rows tell at the next looks."""
+def _fill_looks(square, decay, tick, move, looks):
+    """Fill moves to the next looks, shape (hops, SCAN, 4), of one pair.
+
+    Those after 2^level looks are in the table of moves, and each other one is a few times that of
+    a finer hop: the same bits, since such a factor is exact.
+    """
+    for hop in range(looks.shape[0]):
+        for look in range(SCAN):
+            ticks, level = look + 1, STEP + hop
+            while ticks % 2 == 0:
+                ticks, level = ticks // 2, level + 1
+            if ticks == 1:
+                for row in range(4):
+                    looks[hop, look, row] = move[level, row]
+            elif hop > 0 and 2 * (look + 1) <= SCAN:
+                for row in range(4):
+                    looks[hop, look, row] = looks[hop - 1, 2 * look + 1, row]
+            else:
+                go = _go(square, decay, tick * power_of_two(STEP + hop) * (look + 1))
+                for row in range(4):
+                    looks[hop, look, row] = go[row]
+
+
+@kernel
+def _fill_scans(square, decay, tick, move, ends, other, looks, scans, sides):
+    """Fill the tables of what a law's rows tell at the next looks, of the rock end and beside it.
+
+    Parameters
+    ----------
+    other : int
+        Row of `End` that is beside the piston's velocity.
+    looks : ndarray
+        Room for `_fill_looks`.
+    """
     for k in range(len(square)):
-        first, second = ends[one : one + 2, k], ends[other : other + 2, k]
+        low, speed = ends[End.LOW : End.LOW + 2, k], ends[End.SPEED : End.SPEED + 2, k]
+        second = ends[End.PISTON_SPEED : End.PISTON_SPEED + 2, k]
+        first = ends[other : other + 2, k]
+        _fill_looks(square[k], decay[k], tick, move[:, :, k], looks)
         for hop in range(scans.shape[0]):
             for look in range(SCAN):
-                h = tick * power_of_two(STEP + hop) * (look + 1)
-                view = _view(square[k], decay[k], first, second, h)
+                scan = _view(looks[hop, look], low, speed)
+                side = _view(looks[hop, look], first, second)
                 for row in range(4):
-                    scans[hop, 4 * k + row, look] = view[row]
+                    scans[hop, 4 * k + row, look] = scan[row]
+                    sides[hop, 4 * k + row, look] = side[row]
 
 
 @plain
@@ -310,7 +346,7 @@ def laws_of(forms, dashpot, eta, tick):
     views = np.zeros((2 * JOINED, LONGEST_HOP + 1, VIEWS, alone))
     scans = np.zeros((count, hops, most * VIEWS, SCAN))
     sides, rest = np.zeros_like(scans), np.zeros((2 * JOINED, RESTS))
-    held_by = np.zeros((2 * JOINED, 4, alone))
+    held_by, looks = np.zeros((2 * JOINED, 4, alone)), np.zeros((hops, SCAN, 4))
     for law in range(count):
         form, damped = law // 2, law % 2 == 1
         n, held = forms.sizes[form], forms.stiff[form]
@@ -336,9 +372,8 @@ def laws_of(forms, dashpot, eta, tick):
                 rest[law, row] = _product(shape[place : place + 1], loads)[0]
             if held > 0.0:
                 rest[law, Rest.TAKEN] = _fill_held(pairs, loads, held_by[law])
-            _fill_views(square, decay, tick, own, views[law])
-        _fill_scans(square, decay, tick, own, End.LOW.value, End.SPEED.value, scans[law])
-        _fill_scans(square, decay, tick, own, other, End.PISTON_SPEED.value, sides[law])
+            _fill_views(move[law], own, views[law])
+        _fill_scans(square, decay, tick, move[law], own, other, looks, scans[law], sides[law])
     way, over, pushed = _over(forms, sizes, out, into)
     return Laws(
         sizes, dashpots, move, ends, out, into, taken, rest, views, scans, sides, way, over, pushed,

@@ -112,23 +112,44 @@ def _sum_last(rows, last, out):
 
 
 @kernel
-def fill_quadrature(nodes, weights):
-    """Fill in nodes and weights of Gauss and Legendre from -1 to 1.
+def _fill_quadrature(nodes, weights, before, value):
+    """Fill in nodes and weights; of polynomials of Legendre, the last two that were reached."""
+    n = len(nodes)
+    for i in range(n):
+        nodes[i] = cos(math.pi * (n - 1 - i + 0.75) / (n + 0.5))
+    for _ in range(NEWTON_STEPS):
+        for i in range(n):
+            before[i], value[i] = 1.0, nodes[i]
+        for k in range(2, n + 1):
+            for i in range(n):  # side by side: each of them would wait for its last quotient
+                x, last = nodes[i], value[i]
+                value[i] = ((2.0 * k - 1.0) * x * last - (k - 1.0) * before[i]) / k
+                before[i] = last
+        for i in range(n):
+            x = nodes[i]
+            weights[i] = n * (before[i] - x * value[i]) / (1.0 - x * x)  # the slope
+            nodes[i] = x - value[i] / weights[i]
+    for i in range(n):
+        x, slope = nodes[i], weights[i]
+        weights[i] = 2.0 / ((1.0 - x * x) * slope * slope)
+
+
+@plain
+def quadrature(count):
+    """Nodes and weights of Gauss and Legendre from -1 to 1, so many.
 
     numpy finds them by a matrix so large that a thread of its linear algebra wakes, and then
     spins for a tenth of a second.
     """
-    n = len(nodes)
-    for i in range(n):
-        x, slope = cos(math.pi * (i + 0.75) / (n + 0.5)), 1.0
-        for _ in range(NEWTON_STEPS):
-            before, value = 1.0, x
-            for k in range(2, n + 1):
-                before, value = value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k
-            slope = n * (before - x * value) / (1.0 - x * x)
-            x -= value / slope
-        nodes[n - 1 - i] = x
-        weights[n - 1 - i] = 2.0 / ((1.0 - x * x) * slope * slope)
+    nodes, weights = np.zeros(count), np.zeros(count)
+    _fill_quadrature(nodes, weights, np.zeros(count), np.zeros(count))
+    return nodes, weights
+
+
+@plain
+def enough_nodes(modes):
+    """Nodes that so many modes take in each section."""
+    return 2 * modes + 18
 
 
 @kernel
@@ -180,7 +201,7 @@ def _find_modes(impedance, transit, mass, top_mass, spring, frequency, size, pha
         low = max(0.0, k * math.pi - shift) / whole
         high = (k * math.pi + 0.5 * math.pi + shift) / whole
         for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
+            middle, below, beyond = 0.5 * (low + high), low, high
             wanted = k * math.pi
             if spring > 0.0:
                 wanted += atan2(spring, impedance[-1] * middle)
@@ -188,6 +209,8 @@ def _find_modes(impedance, transit, mass, top_mass, spring, frequency, size, pha
                 low = middle
             else:
                 high = middle
+            if low == below and high == beyond:
+                break
         w = 0.5 * (low + high)
         phase = atan2(top_mass * w, impedance[0])
         at_top = cos(phase)
@@ -253,7 +276,7 @@ def _yields_left(low, frequency, spring):
 
 
 @plain
-def with_residual(modes, spring):
+def with_residual(modes, spring, nodes, weights):
     """Return the modes of a bar on a spring with what those left out yield in place of the last.
 
     A constant force at the low end moves such a bar as a whole, by 1 / K. Less what the other
@@ -266,6 +289,8 @@ def with_residual(modes, spring):
         As `bar_modes` finds them.
     spring : float
         Stiffness under the low end [N/m].
+    nodes, weights : ndarray
+        A `quadrature` of `enough_nodes`.
 
     Returns
     -------
@@ -283,8 +308,6 @@ def with_residual(modes, spring):
     last[:n] = -low[:n] / (modes.frequency[:n] * modes.frequency[:n])
     last[n] = 1.0 / spring
     # by quadrature: as a difference of squares it would lose its digits
-    nodes, weights = np.zeros(2 * n + 20), np.zeros(2 * n + 20)
-    fill_quadrature(nodes, weights)
     inertia = _inertia(
         modes.mass, modes.transit, modes.top_mass, wave, size, phase, last, nodes, weights
     )
@@ -308,18 +331,56 @@ def _sinc(x):
 
 
 @kernel
-def _fill_products(mass, transit, w, size, phase, w_2, size_2, phase_2, out):
-    """Fill the products of two sets of shapes, weighted by mass."""
+def _fill_products(mass, transit, w, size, phase, w_2, size_2, phase_2, out, back):
+    """Fill the products of two sets of shapes, weighted by mass, and those of the second and first.
+
+    They differ by rounding alone, and what is dear in them is the same.
+    """
     for k in range(len(w)):
         for j in range(len(w_2)):
-            total = 0.0
+            total = other = 0.0
             for i in range(len(transit)):
                 less = 0.5 * (w[k] - w_2[j]) * transit[i]
                 more = 0.5 * (w[k] + w_2[j]) * transit[i]
                 both = _sinc(less) * cos(phase[k, i] - phase_2[j, i] + less)
                 both += _sinc(more) * cos(phase[k, i] + phase_2[j, i] + more)
                 total += 0.5 * mass[i] * size[k, i] * size_2[j, i] * both
+                other += 0.5 * mass[i] * size_2[j, i] * size[k, i] * both
             out[k, j] = total
+            back[j, k] = other
+
+
+@plain
+def _of_shapes(one, first, other, second, waves):
+    """Products of shapes by those of their waves."""
+    by_shape = summed(other, np.ascontiguousarray(summed(one, waves).T))
+    found = np.ascontiguousarray(by_shape.T)
+    if first == 0 and second == 0 and one.top_mass > 0.0 and other.top_mass > 0.0:
+        mine, theirs = shape_above(one, 0), shape_above(other, 0)
+        for k in range(len(mine)):
+            found[k] += one.top_mass * (mine[k] * theirs)
+    return found
+
+
+@plain
+def products_both(one, first, other, second, count):
+    """`products` of two bars, and those of the second and the first."""
+    out = np.zeros((len(one.frequency), len(other.frequency)))
+    back = np.zeros((len(other.frequency), len(one.frequency)))
+    _fill_products(
+        one.mass[first : first + count],
+        one.transit[first : first + count],
+        one.wave,
+        np.ascontiguousarray(one.size[:, first : first + count]),
+        np.ascontiguousarray(one.phase[:, first : first + count]),
+        other.wave,
+        np.ascontiguousarray(other.size[:, second : second + count]),
+        np.ascontiguousarray(other.phase[:, second : second + count]),
+        out,
+        back,
+    )
+    there = _of_shapes(one, first, other, second, out)
+    return there, _of_shapes(other, second, one, first, back)
 
 
 @plain
@@ -338,25 +399,7 @@ def products(one, first, other, second, count):
     ndarray, shape (modes of one, modes of the other)
         Weighted by mass.
     """
-    out = np.zeros((len(one.frequency), len(other.frequency)))
-    _fill_products(
-        one.mass[first : first + count],
-        one.transit[first : first + count],
-        one.wave,
-        np.ascontiguousarray(one.size[:, first : first + count]),
-        np.ascontiguousarray(one.phase[:, first : first + count]),
-        other.wave,
-        np.ascontiguousarray(other.size[:, second : second + count]),
-        np.ascontiguousarray(other.phase[:, second : second + count]),
-        out,
-    )
-    by_shape = summed(other, np.ascontiguousarray(summed(one, out).T))
-    found = np.ascontiguousarray(by_shape.T)
-    if first == 0 and second == 0 and one.top_mass > 0.0 and other.top_mass > 0.0:
-        mine, theirs = shape_above(one, 0), shape_above(other, 0)
-        for k in range(len(mine)):
-            found[k] += one.top_mass * (mine[k] * theirs)
-    return found
+    return products_both(one, first, other, second, count)[0]
 
 
 @plain

@@ -19,8 +19,10 @@ from percussion_model.solvers.modal.modes import (
     Modes,
     bar_modes,
     count_below,
-    fill_quadrature,
+    enough_nodes,
     products,
+    products_both,
+    quadrature,
     shape_above,
     shape_low,
     totals,
@@ -90,8 +92,7 @@ def _fill_moves(w, eta, tick, nodes, weights, out):
 @plain
 def moves_of(frequency, eta, tick):
     """Table of moves over 2^level ticks, shape (LEVELS, MOVES, n)."""
-    nodes, weights = np.zeros(NODES), np.zeros(NODES)
-    fill_quadrature(nodes, weights)
+    nodes, weights = quadrature(NODES)
     out = np.zeros((LEVELS, MOVES, len(frequency)))
     _fill_moves(frequency, eta, tick, nodes, weights, out)
     return out
@@ -140,33 +141,33 @@ def _shapes(modes, above):
 
 
 @plain
-def _modes_of_form(form, bit, both, piston_mass, counts, stiff):
+def _modes_of_form(form, bit, both, piston_mass, counts, stiff, rules):
     """Modes of one form, the last of which yields what those left out do."""
     n_bit, n_piston, n = counts
     joined = form >= JOINED
     rigid = piston_mass if joined and n_piston == 0 else 0.0
     bar, count = (both, n) if joined else (bit, n_bit)
     modes = bar_modes(bar, count, stiff[form], rigid)
-    return with_residual(modes, stiff[form]) if stiff[form] > 0.0 else modes
+    nodes, weights = rules[1] if joined else rules[0]
+    return with_residual(modes, stiff[form], nodes, weights) if stiff[form] > 0.0 else modes
 
 
 @plain
 def _fill_changes(found, above, sections, sizes, change):
     """Fill what the modes of one form become in another."""
     for one in range(FORMS):
-        for other in range(FORMS):
-            if one == other or sizes[one] == 0 or sizes[other] == 0:
+        for other in range(one + 1, FORMS):
+            if sizes[one] == 0 or sizes[other] == 0:
                 continue
             if one % JOINED != other % JOINED and one // JOINED != other // JOINED:
                 continue
             a, b = found[one], found[other]
             if one // JOINED == other // JOINED:
-                part = products(b, 0, a, 0, len(a.mass))
-            elif one < JOINED:
-                part = products(b, above, a, 0, sections)
+                there, back = products_both(b, 0, a, 0, len(a.mass))
             else:
-                part = products(b, 0, a, above, sections)
-            change[one, other % JOINED, : part.shape[1], : part.shape[0]] = part.T
+                there, back = products_both(b, above, a, 0, sections)
+            change[one, other % JOINED, : there.shape[1], : there.shape[0]] = there.T
+            change[other, one % JOINED, : back.shape[1], : back.shape[0]] = back.T
 
 
 @kernel
@@ -219,13 +220,14 @@ def forms_of(bit, piston, piston_mass, springs, highest, eta, tick):
     shape, move = np.zeros((FORMS, SHAPES, n)), np.zeros((FORMS, LEVELS, MOVES, n))
     change = np.zeros((FORMS, JOINED, n, n))
     join = np.zeros((JOINED, max(n_piston, 1), n))
+    rules = quadrature(enough_nodes(n_bit)), quadrature(enough_nodes(n))
     found = (
-        _modes_of_form(0, bit, both, piston_mass, counts, stiff),
-        _modes_of_form(1, bit, both, piston_mass, counts, stiff),
-        _modes_of_form(2, bit, both, piston_mass, counts, stiff),
-        _modes_of_form(3, bit, both, piston_mass, counts, stiff),
-        _modes_of_form(4, bit, both, piston_mass, counts, stiff),
-        _modes_of_form(5, bit, both, piston_mass, counts, stiff),
+        _modes_of_form(0, bit, both, piston_mass, counts, stiff, rules),
+        _modes_of_form(1, bit, both, piston_mass, counts, stiff, rules),
+        _modes_of_form(2, bit, both, piston_mass, counts, stiff, rules),
+        _modes_of_form(3, bit, both, piston_mass, counts, stiff, rules),
+        _modes_of_form(4, bit, both, piston_mass, counts, stiff, rules),
+        _modes_of_form(5, bit, both, piston_mass, counts, stiff, rules),
     )
     for form in range(FORMS):
         joined = form >= JOINED
