@@ -32,7 +32,7 @@ from fmu_src.units import fmi_unit
 from fmu_src.variables import FILE, Variable, magnitude, number_row, write_variables
 from percussion_model.coupling.component import CouplingError
 from percussion_model.coupling.fresh import fresh
-from percussion_model.coupling.python_part import PythonPart
+from percussion_model.coupling.python_part import PythonPart, fault_text
 
 # First value references, units to display, and the default experiment [s].
 FIRST = {"input": 1, "output": 100, "parameter": 200}
@@ -200,19 +200,24 @@ def _argument(name: str, start: Any) -> tuple[Any, ...]:
 def _tried(file: Path, name: str) -> tuple[str, dict[str, Any]]:
     """Let a controller do its first steps; its arguments, and why its state cannot be saved."""
     inputs = {one: entry[3] for one, entry in controller.TABLE.inputs.items()}
+    did = f"{file}: cannot be loaded"
     try:
         given = own.loaded(file, name)
-        work = fresh("controller", given, is_new=True)
+        did = f"{file}:{name}"
+        work = fresh(str(file), given, is_new=True)
         part = PythonPart("controller", lambda: work, inputs)
+        reader = part.reader(own.SIGNALS)
         part.begin()
         starts = own.arguments_of(given) if own.is_maker(given) else {}
         model = own.OwnController({**starts, own.SOURCE: file, own.NAME: name})
         for step in (0.0, STEP_SIZE, STEP_SIZE):
             part.step(0.0, step)
-            part.reader(own.SIGNALS).read()
+            reader.read()
             model.step(inputs, step)
     except CouplingError:
         raise
+    except own.ControllerError as error:
+        raise CouplingError(f"{file}: {error}") from None
     except (Exception, SystemExit) as error:
-        raise CouplingError(f"{file}:{name}: {type(error).__name__}: {error}") from None
+        raise CouplingError(f"{did}: {fault_text(error)}") from None
     return model.why_not_saved(), starts

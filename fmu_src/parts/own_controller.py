@@ -28,11 +28,15 @@ SIGNALS = "force_command", "pressure_command", "percussion_on"
 LARGEST = {bool: 1, int: 2**31 - 1, float: 1e12}
 
 
+class ControllerError(ValueError):
+    """What is wrong with a controller, as its message says."""
+
+
 class Inputs(dict[str, Any]):
     """Inputs by name; the error of a missing one names those that are there."""
 
     def __missing__(self, name: str) -> Any:
-        raise ValueError(f"there is no input {name!r}: {said_among(name, self)}")
+        raise ControllerError(f"there is no input {name!r}: {said_among(name, self)}")
 
 
 @contextmanager
@@ -41,7 +45,7 @@ def no_exit() -> Iterator[None]:
     try:
         yield
     except SystemExit as error:
-        raise ValueError(f"the controller ends the program: SystemExit({error})") from error
+        raise ControllerError(f"the controller ends the program: SystemExit({error})") from error
 
 
 def loaded(file: Path, name: str) -> Callable[..., Any]:
@@ -54,7 +58,7 @@ def loaded(file: Path, name: str) -> Callable[..., Any]:
         spec.loader.exec_module(module)
     found: Callable[..., Any] | None = getattr(module, name, None)
     if not callable(found):
-        raise ValueError(f"{file.name} has no function or class {name}")
+        raise ControllerError(f"has no function or class {name}")
     return found
 
 
@@ -63,7 +67,9 @@ def arguments_of(given: Callable[..., Any]) -> dict[str, Any]:
     found = {one.name: one.default for one in inspect.signature(given).parameters.values()}
     taken = sorted(found.keys() & {*INPUTS, *SIGNALS})
     if taken:
-        raise ValueError(f"{taken[0]}: an argument cannot be called as an input or an output is")
+        raise ControllerError(
+            f"{taken[0]}: an argument cannot be called as an input or an output is"
+        )
     return {name: one for name, one in found.items()
             if type(one) in (bool, int, float) and abs(one) <= LARGEST[type(one)]}  # fmt: skip
 
@@ -97,18 +103,24 @@ class OwnController(Model):
         with no_exit():
             sent = self.work(given, self.time, step_size)
         if not isinstance(sent, Mapping):
-            raise ValueError(f"the controller gave {sent!r:.40}, not outputs by their names")
+            raise ControllerError(
+                f"the controller returned {sent!r:.40}: must return a dict with "
+                f"{', '.join(SIGNALS)}"
+            )
         lacking = [name for name in SIGNALS if name not in sent]
         if lacking:
-            raise ValueError(f"the controller gave no {', '.join(lacking)}")
-        self.sent = {
-            "force_command": float(sent["force_command"]),
-            "pressure_command": float(sent["pressure_command"]),
-            "percussion_on": bool(sent["percussion_on"]),
-        }
-        for name, value in self.sent.items():
-            if not math.isfinite(value):
-                raise ValueError(f"the controller gave {name} = {value}: must be a finite number")
+            raise ControllerError(f"the controller gave no {', '.join(lacking)}")
+        found: dict[str, Any] = {}
+        for name in SIGNALS:
+            try:
+                found[name] = (bool if name == "percussion_on" else float)(sent[name])
+            except (TypeError, ValueError):
+                found[name] = math.nan
+            if not math.isfinite(found[name]):
+                raise ControllerError(
+                    f"the controller gave {name} = {sent[name]!r:.40}: must be a finite number"
+                )
+        self.sent = found
 
     def outputs(self) -> dict[str, Any]:
         """What it gave last."""

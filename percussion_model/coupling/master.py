@@ -122,8 +122,9 @@ class Coupling:
             chosen = replaced.get(name, source)
             fmu = source if callable(chosen) else Path(chosen)
             folders[name] = tempfile.mkdtemp(prefix="fmu-", dir=self._folder)
-            with naming(name):
+            with naming(f"{name}: {fmu.name}"):
                 unpack_zip(fmu, Path(folders[name]), allowance)
+            with naming(name):
                 check_xml(Path(folders[name]) / DESCRIPTION, DESCRIPTION, allowance)
             descriptions[name] = read_description(name, folders[name])
         others = {name for name, chosen in replaced.items() if not callable(chosen)}

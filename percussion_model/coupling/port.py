@@ -96,7 +96,8 @@ class Port:
             are_finite = math.isfinite(sum(found))
         except TypeError:
             given = dict(zip(self.taken, found, strict=False))
-            raise CouplingError(f"{self.name}: {given} are not all numbers") from None
+            wrong = {name: one for name, one in given.items() if not hasattr(one, "__float__")}
+            raise CouplingError(f"{self.name}: {wrong or given}: must be numbers") from None
         if not are_finite:
             self.refuse(found)
         self.values[self.begin : self.end] = found

@@ -44,6 +44,7 @@ class PythonPart:
         self.name, self.given, self.starts = name, given, dict(starts)
         self.inputs: dict[str, Any] = dict(starts)
         self.outputs: dict[str, Any] = {}
+        self.wanted: set[str] = set()  # outputs that are read
 
     def begin(self) -> None:
         """Make what works in this run."""
@@ -52,24 +53,30 @@ class PythonPart:
         except CouplingError:
             raise
         except (Exception, SystemExit) as error:
-            raise self._failure(error) from error
+            raise CouplingError(f"{self.name}: {fault_text(error)}") from error
 
     def step(self, time: float, step: float) -> None:
         """One communication step [s]."""
         try:
-            self.outputs = dict(self.work(Inputs(self.inputs), time, step))
+            found = self.work(Inputs(self.inputs), time, step)
         except (Exception, SystemExit) as error:
-            raise self._failure(error) from error
-
-    def _failure(self, error: BaseException) -> CouplingError:
-        kind = "" if isinstance(error, CouplingError) else f"{type(error).__name__}: "
-        return CouplingError(f"{self.name}: {kind}{error}{_source_place(error)}")
+            raise CouplingError(f"{self.name}: {fault_text(error)}") from error
+        try:
+            self.outputs = dict(found)
+        except (TypeError, ValueError):
+            raise CouplingError(
+                f"{self.name}: {_named(self.work)} returned {found!r:.40}: must return a dict with "
+                f"{', '.join(sorted(self.wanted))}"
+            ) from None
 
     def reader(self, names: Sequence[str]) -> PythonSignals:
         """Return a reader of outputs."""
+        self.wanted.update(names)
         return PythonSignals(self, names)
 
-    writer = reader  # of inputs
+    def writer(self, names: Sequence[str]) -> PythonSignals:
+        """Return a writer of inputs."""
+        return PythonSignals(self, names)
 
 
 class PythonSignals:
@@ -117,9 +124,22 @@ def input_starts(name: str, description: Any, values: Mapping[str, Any]) -> dict
     return found
 
 
-def _source_place(error: BaseException) -> str:
-    """File and line of a fault in a callable; faults of syntax have them in their text."""
+def fault_text(error: BaseException) -> str:
+    """What a fault in Python code of a user is, with its file and line.
+
+    Faults of syntax have these in their text.
+    """
+    kind = "" if isinstance(error, CouplingError) else type(error).__name__
+    text = ": ".join(filter(None, (kind, str(error))))
     if isinstance(error, SyntaxError):
-        return ""
+        return text
     frames = [at for at in traceback.extract_tb(error.__traceback__) if at.filename != __file__]
-    return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
+    return f"{text} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})"
+
+
+def _named(work: Work) -> str:
+    """Name of a callable, and of its file where it is written in Python."""
+    body: Any = work if hasattr(work, "__code__") else type(work).__call__
+    if not hasattr(body, "__code__"):
+        return f"an object of {type(work).__name__}"
+    return f"{body.__qualname__} ({Path(body.__code__.co_filename).name})"

@@ -22,7 +22,6 @@ from percussion_model.coupling.ssp_values import (
     transformation_of,
 )
 from percussion_model.coupling.ssp_xml import (
-    InvalidError,
     Reader,
     elements,
     is_true,
@@ -140,14 +139,11 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
             f"{path}: no such file; `percussion system {path.stem}` makes it in dist, if it ships"
         )
     reader = Reader(Path(folder), allowance)
-    with naming(f"{path}: no SSP archive"):
-        unpack_zip(path, Path(folder), allowance)
-    try:
+    with naming(path):
+        unpack_zip(path, reader.folder, allowance)
+        if not (reader.folder / STRUCTURE).is_file():
+            raise CouplingError(f"is no SSP archive: there is no {STRUCTURE} in it")
         return _read(path, reader)
-    except InvalidError as error:
-        raise CouplingError(f"{path}: no SSP archive: {error}") from error
-    except CouplingError as error:
-        raise CouplingError(f"{path}: {error}") from error
 
 
 def _read(path: Path, reader: Reader) -> Archive:

@@ -36,10 +36,6 @@ _TOLD = (
 )
 
 
-class InvalidError(CouplingError):
-    """A file that is not what the standard wants."""
-
-
 class Reader:
     """Reads XML of an unpacked archive, each file once.
 
@@ -62,7 +58,7 @@ class Reader:
         """Root of a file that the structure names by its URI."""
         place, name = within(self.folder, source), shortened(source)
         if place is None:
-            raise InvalidError(f"{name}: is no file within the archive")
+            raise CouplingError(f"{name}: is no file within the archive")
         if (place, space) not in self._read:
             if len(self._read) == MOST_FILES:
                 raise CouplingError(f"names more than {MOST_FILES} files of values")
@@ -70,15 +66,12 @@ class Reader:
         return self._read[place, space]
 
     def _root(self, place: Path, name: str, space: str) -> Any:
-        try:
-            check_xml(place, name, self.allowance)
-        except CouplingError as error:
-            raise InvalidError(str(error)) from error
+        check_xml(place, name, self.allowance)
         parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
         try:
             root = etree.parse(str(place), parser).getroot()
         except etree.XMLSyntaxError as error:  # what expat let pass
-            raise InvalidError(f"{name}: is not valid XML: {one_line(error)}") from None
+            raise CouplingError(f"{name}: is not valid XML: {one_line(error)}") from None
         return validated(root, name, space)
 
 
@@ -104,11 +97,11 @@ def validated(root: Any, name: str, space: str) -> Any:
         for prefix, address in SPACES.items():
             text = text.replace(f"{{{address}}}", f"{prefix}:")
         above = "; of SSP 2.0 that is read which 1.0 has" if version.startswith("2.") else ""
-        raise InvalidError(f"{name}: line {fault.line}: {shortened(text)}{above}")
+        raise CouplingError(f"{name}: line {fault.line}: {shortened(text)}{above}")
     for node in root.iter(etree.Element):
         for key in _TOLD:
             if unprintable(value := node.get(key, "")):
-                raise InvalidError(
+                raise CouplingError(
                     f"{name}: line {node.sourceline}: {key} = {shortened(value)!r}: must be "
                     "printable"
                 )

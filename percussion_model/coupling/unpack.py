@@ -43,22 +43,22 @@ class Allowance:
         self.trusted = trusted
         self._bytes, self._entries, self._xml = MOST_BYTES, MOST_ENTRIES, MOST_XML
 
-    def take(self, name: str, entries: list[ZipInfo]) -> None:
+    def take(self, entries: list[ZipInfo]) -> None:
         """Count the entries of an archive; `CouplingError` where they are too much."""
         if self.trusted:
             return
         for one in entries:
             if one.file_size > SMALL and one.file_size > HIGHEST_RATIO * one.compress_size:
                 raise _too_much(
-                    f"{name}: {shortened(one.filename)} unpacks to {one.file_size} bytes, more "
-                    f"than {HIGHEST_RATIO} times what it is packed in"
+                    f"{shortened(one.filename)} unpacks to {one.file_size} bytes, more than "
+                    f"{HIGHEST_RATIO} times what it is packed in"
                 )
         self._bytes -= sum(one.file_size for one in entries)
         self._entries -= len(entries)
         if self._bytes < 0:
-            raise _too_much(f"{name}: unpacks to more than {MOST_BYTES} bytes, FMUs included")
+            raise _too_much(f"unpacks to more than {MOST_BYTES} bytes, FMUs included")
         if self._entries < 0:
-            raise _too_much(f"{name}: holds more than {MOST_ENTRIES} files, FMUs included")
+            raise _too_much(f"holds more than {MOST_ENTRIES} files, FMUs included")
 
     def parse(self, name: str, size: int) -> None:
         """Count a file of XML that will be parsed [bytes]; `CouplingError` where it is too much."""
@@ -75,9 +75,9 @@ class Allowance:
             return
         size = path.stat().st_size
         if size > LARGEST_FILE:
-            raise _too_much(f"{path.name}: has {size} bytes, more than {LARGEST_FILE}")
+            raise _too_much(f"has {size} bytes, more than {LARGEST_FILE}")
         if path.read_bytes().count(_ENTRY) > MOST_ENTRIES:
-            raise _too_much(f"{path.name}: lists more than {MOST_ENTRIES} files")
+            raise _too_much(f"lists more than {MOST_ENTRIES} files")
 
 
 def _too_much(text: str) -> CouplingError:
@@ -85,25 +85,27 @@ def _too_much(text: str) -> CouplingError:
 
 
 def unpack_zip(path: Path, folder: Path, allowance: Allowance) -> None:
-    """Unpack an archive into a folder that is there; nothing is written outside of it."""
-    name = path.name
-    allowance.open(path)
+    """Unpack an archive into a folder that is there; nothing is written outside of it.
+
+    What is said of it does not name it.
+    """
     try:
+        allowance.open(path)
         with ZipFile(path) as archive:
             entries = archive.infolist()
-            refuse_entries(name, entries)
-            allowance.take(name, entries)
+            refuse_entries(entries)
+            allowance.take(entries)
             archive.extractall(folder)
     except CouplingError:
         raise
     except (BadZipFile, OSError, ValueError, EOFError, RuntimeError, OverflowError) as error:
-        raise CouplingError(f"{name}: cannot be unpacked: {one_line(error)}") from error
+        raise CouplingError(f"cannot be unpacked: {one_line(error)}") from error
     except Exception as error:  # of zlib, struct and the decoding of names
         kind = type(error).__name__
-        raise CouplingError(f"{name}: cannot be unpacked: {kind}: {one_line(error)}") from error
+        raise CouplingError(f"cannot be unpacked: {kind}: {one_line(error)}") from error
 
 
-def refuse_entries(name: str, entries: list[ZipInfo]) -> None:
+def refuse_entries(entries: list[ZipInfo]) -> None:
     """`CouplingError` for entries that FMI and SSP have no use for, and that do harm."""
     seen: set[str] = set()
     for one in entries:
@@ -117,7 +119,7 @@ def refuse_entries(name: str, entries: list[ZipInfo]) -> None:
         elif not fault and one.flag_bits & 1:
             fault = "is encrypted"
         if fault:
-            raise CouplingError(f"{name}: {shortened(one.filename)!r} {fault}")
+            raise CouplingError(f"{shortened(one.filename)!r} {fault}")
         seen.add(one.filename.casefold().rstrip("/"))
 
 

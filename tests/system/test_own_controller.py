@@ -161,6 +161,12 @@ def test_what_no_state_can_hold_is_named(text, kept, written):
          "'pressure_command': 2e6, 'percussion_on': True}", "nan: must be a finite"),
         ("import no_such_package", "ModuleNotFoundError: No module named 'no_such_package'"),
         ("def PI(inputs, time, step):\n    return {}", "gave no force_command"),
+        ("def PI(inputs, time, step):\n    pass", r"^controller: PI \(my.py\) returned None: must "
+         "return a dict with force_command, percussion_on, pressure_command$"),
+        ("raise ValueError('no data')", r"my.py: cannot be loaded: ValueError: no data \(my.py, "),
+        ("def PI(inputs, time, step):\n    return {'force_command': '3 kN', "
+         "'pressure_command': 2e6, 'percussion_on': True}",
+         "my.py: the controller gave force_command = '3 kN': must be a finite number"),
         ("def PI(inputs, time, step):\n    return inputs['feed_farce']", "did you mean feed_force"),
         ("class PI:\n    def __init__(self, feed_force=1.0): pass\n"
          "    def __call__(self, inputs, time, step): pass", "feed_force: an argument cannot be"),

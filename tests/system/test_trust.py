@@ -109,7 +109,11 @@ NASTY = {
     "document type": (in_structure(b"<ssd:System ", LAUGHS + b"<ssd:System "), "not valid XML"),
     "entities": (in_structure(b"?>\n", b"?>\n" + LAUGHS), "has a document type"),
     "deep structure": (deep, "levels deep"),
-    "no number": (no_number, "no SSP archive: "),
+    "no number": (no_number, "System.ssp: component rig: resources/rig.ssv: line"),
+    "no structure": (
+        lambda entries, tmp_path: {k: entries[k] for k in entries if k != STRUCTURE},
+        "System.ssp: is no SSP archive: there is no SystemStructure.ssd in it",
+    ),
     "path above": (added("../evil"), "'../evil' is no path within"),
     "absolute path": (added("{tmp_path}/evil"), "is no path within"),
     "path with control characters": (added("a\x1b[31m"), "cannot be printed"),

@@ -146,6 +146,7 @@ def _load(controller: str | None, values: Mapping[str, Any]) -> Any:
     """Path of an FMU, or what loads FILE.py afresh for a run and makes its NAME with values."""
     from percussion_model.coupling import CouplingError
     from percussion_model.coupling.fresh import fresh, with_values
+    from percussion_model.coupling.python_part import fault_text
 
     if controller is None:
         return None
@@ -165,10 +166,13 @@ def _load(controller: str | None, values: Mapping[str, Any]) -> Any:
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        try:
+            spec.loader.exec_module(module)
+        except (Exception, SystemExit) as error:
+            raise CouplingError(f"{file}: cannot be loaded: {fault_text(error)}") from error
         work: Callable[..., Any] | None = getattr(module, name, None)
         if not callable(work):
             raise CouplingError(f"{file} has no function or class {name}")
-        return fresh(name, with_values(work, values) if values else work, is_new=True)
+        return fresh(file, with_values(work, values) if values else work, is_new=True)
 
     return anew
