@@ -153,6 +153,7 @@ def test_a_motion_that_changes_with_the_cells_is_said_to(capsys):
     show_settled(found)
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "not the same on a second resolution: aperiodic" in shown
+    assert "it may be many times that of a run" in shown
     assert "Stability multiplier undecided, at this resolution" in shown
     show_settled(settled(chatter(24)))
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())

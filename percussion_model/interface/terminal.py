@@ -214,7 +214,13 @@ def settled_error(found: Settled) -> str:
         parts = f"{settling} alone, since this solver has no grid"
     else:
         parts = f"discretisation and {settling}"
-    return f"± is the numerical error, by {parts}. {NOT_THE_MODEL}"
+    careful = ""
+    if found.same_motion is False:
+        careful = (
+            " Where a coarser resolution has another motion it may be many times that of a run, "
+            "which is compared over its first blows."
+        )
+    return f"± is the numerical error, by {parts}.{careful} {NOT_THE_MODEL}"
 
 
 def show_study(found: Study) -> None:
