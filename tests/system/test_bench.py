@@ -23,6 +23,7 @@ from percussion_model.interface.bench_page import write_bench_page
 from percussion_model.interface.bench_text import COLUMNS, about_errors, cells, points_text
 from percussion_model.interface.cli import main
 from percussion_model.interface.progress import RunProgress
+from tests.browser import find_browser, visit
 
 COLUMN = {name: k for k, (name, *_) in enumerate(COLUMNS)}
 
@@ -111,7 +112,7 @@ def test_a_crash_has_no_points_and_a_page(feed_control, tmp_path, monkeypatch, c
     assert "rod ended early, at 0.051 s: controller: RuntimeError: no idea what to do" in said
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "no idea what to do" in page
-    assert '<tr class="bad"><td><a href="#rod">rod</a></td><td>a rod is added</td>' in page
+    assert '<tr class="bad"><td><a href="#rod">rod</a><small>a rod is added</small></td>' in page
     assert "1 of 1 runs failed: rod" in page
 
 
@@ -145,6 +146,10 @@ def test_a_bad_controller_fails_visibly(feed_control, tmp_path, monkeypatch, cap
     page = (out / "index.html").read_text(encoding="utf-8")
     assert '<tr class="bad">' in page
     assert f'<p class="bad">{found["faults"][0]}</p>' in page
+    if find_browser() is not None:  # the table is as wide as a telephone, and scrolls
+        width = "document.documentElement.scrollWidth"
+        seen = visit(out / "index.html", tmp_path / "profile", (width,), width=390)
+        assert (seen.answers, seen.errors) == ([390], [])
 
 
 def test_an_interrupted_bench_keeps_the_runs_that_are_done(
