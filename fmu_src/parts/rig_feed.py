@@ -95,7 +95,7 @@ TABLE = PartTable(
         "cylinder.area": ("m^2", 1e-5, 1.0, 4e-3, "area of the piston"),
         "cylinder.volume": ("m^3", 1e-5, 10.0, 1e-2, "volume under pressure, with hoses"),
         "cylinder.bulk_modulus": ("Pa", 1e5, 1e10, 2e8, "stiffness of oil and hoses"),
-        "cylinder.leakage": ("m^3/(s Pa)", 0.0, 1e-6, 0.0, "leak by pressure"),
+        "cylinder.leakage": ("m^3/(s Pa)", 0.0, 1e-6, 0.0, "leak per pressure"),
         "servo.time": ("s", 1e-3, 10.0, 0.02, "time constant of the pressure"),
         "servo.velocity": ("m/s", 1e-3, 10.0, 0.3, "velocity of the head at full flow"),
         "force_limit": ("N", 0.0, 1e7, 2e4, "force at which the relief valves open"),

@@ -156,7 +156,7 @@ def _numbers() -> Entries:
 TABLE = PartTable(
     name="RockFilter",
     slave=RockFilterPart,
-    description="Rock from rate, pressure, feed, rotation: crushing energy by efficiency",
+    description="Rock from rate, pressure, feed, rotation: crushing energy divided by efficiency",
     inputs={
         "bit_position": ("m", -1e6, 1e6, 0.0, "displacement of the bit"),
         "rate_of_penetration": ("m/s", -1e4, 1e4, 0.0, "measured rate of penetration"),
@@ -167,7 +167,7 @@ TABLE = PartTable(
         "rotation_torque": ("N m", -1e9, 1e9, 0.0, "measured torque of the rotation; 0: none"),
     },
     outputs={
-        "apparent_energy": ("J/m^3", "crushing energy by efficiency of the bit"),
+        "apparent_energy": ("J/m^3", "crushing energy divided by the efficiency of the bit"),
         "apparent_energy_low": ("J/m^3", "low end of its interval of 95 %"),
         "apparent_energy_high": ("J/m^3", "high end of its interval of 95 %"),
         "layers": (COUNT, "changes of layer that were found"),

@@ -167,10 +167,10 @@ TABLE = PartTable(
         "variation.length": ("m", 1e-4, 1e3, 0.01, "distance of the knots of the variation"),
         "variation.seed": (COUNT, 0, 1_000_000, 1, "seed of the variation"),
         "best_feed.force": ("N", 1.0, 1e9, 2500.0, "feed force at which K_R is lowest"),
-        "best_feed.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R by the square of the distance"),
+        "best_feed.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R per square of the distance"),
         "best_pressure.pressure": ("Pa", 1.0, 1e9, 2e6, "supply pressure at which K_R is lowest"),
-        "best_pressure.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R by the square of the distance"),
-        "torque_arm": ("m", 0.0, 10.0, 0.04, "torque by feed force in sound rock"),
+        "best_pressure.factor": ("1", 0.0, 1e6, 0.0, "growth of K_R per square of the distance"),
+        "torque_arm": ("m", 0.0, 10.0, 0.04, "torque per feed force in sound rock"),
         "void_stiffness": ("N/m", 0.0, 1e13, 1e7, "K_R up to which a layer counts as a void"),
     },
     at_start={

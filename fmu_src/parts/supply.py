@@ -119,9 +119,9 @@ TABLE = PartTable(
         "vent.flow_limit": ("m^3/s", 0.0, 100.0, 0.1, "flow of the vent above what is wanted"),
         "hose.volume": ("m^3", 1e-6, 100.0, 2e-2, "volume of the hose, and of rods with air"),
         "hose.bulk_modulus": ("Pa", 1e4, 1e10, 2.1e6, "stiffness of oil and hose, or of gas"),
-        "hose.resistance": ("Pa s/m^3", 0.0, 1e12, 2e7, "pressure drop by flow"),
+        "hose.resistance": ("Pa s/m^3", 0.0, 1e12, 2e7, "pressure drop per flow"),
         "drive.volume": ("m^3", 0.0, 1.0, 1.2e-4, "volume that the drive takes for a blow"),
-        "drive.leakage": ("m^3/(s Pa)", 0.0, 1e-3, 2e-10, "flow past the piston by pressure"),
+        "drive.leakage": ("m^3/(s Pa)", 0.0, 1e-3, 2e-10, "flow past the piston per pressure"),
         "relief_pressure": ("Pa", 0.0, 1e9, 3.2e6, "pressure at which the relief valve opens"),
         "start.pressure": ("Pa", 0.0, 1e9, 2e6, "pressure at the start"),
         "medium": ("", 0, 0, ("oil", "air"), "a volume for each blow, or compressed air by mass; "

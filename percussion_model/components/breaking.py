@@ -107,7 +107,7 @@ COMPONENT = Component(
         "crushing_energy": (
             CRUSHING_ENERGY,
             "J/m^3",
-            "e_c: crushing energy by volume of a crater beyond the threshold; "
+            "e_c: crushing energy per volume of a crater beyond the threshold; "
             "0: the hole advances by what is pressed in",
             0.0,
             1e12,

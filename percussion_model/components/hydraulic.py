@@ -313,7 +313,7 @@ COMPONENT = Component(
         "valve_width": (70e-3, "m", "length of the edges that the spool opens", 1e-6, 10.0),
         "valve_lap": (0.0, "m", "way of the spool to either side of its middle in which it "
                       "closes both ports", 0.0, 0.1),
-        "leak": (1.36e-12, "m^3/s/Pa", "leakage of the line to the tank, by the difference of "
+        "leak": (1.36e-12, "m^3/s/Pa", "leakage of the line to the tank, per difference of "
                  "their pressures; the same of the rear chamber", 0.0, 1e-6),
         "gas_volume": (0.2e-3, "m^3", "gas of the accumulator without oil", 1e-6, 1.0),
         "precharge": (60e5, "Pa", "its pressure then, absolute", 1e3, 1e8),
@@ -341,7 +341,7 @@ COMPONENT = Component(
         "line_pressure": ("Pa", "pressure of the pump's line, absolute", 0.0),
         "spool": ("m", "how far the spool has gone towards the line", 0.0),
         "gas": ("m^3", "volume of the accumulator's gas", 0.0),
-        "oil": ("m^3/s", "oil that the last blow took from the pump, by its period", 0.0),
+        "oil": ("m^3/s", "oil that the last blow took from the pump, divided by its period", 0.0),
         "pressure": ("Pa", "mean pressure at which the pump gave it, above that of the "
                      "surroundings", 0.0),
         "used": ("m^3", "oil from the pump since the start", 0.0),

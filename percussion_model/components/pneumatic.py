@@ -447,7 +447,7 @@ COMPONENT = Component(
         "lower_pressure": ("Pa", "pressure of the lower chamber, absolute", 0.0),
         "exhaust_pressure": ("Pa", "pressure behind the flushing holes, absolute", 0.0),
         "supply": ("Pa", "pressure of the supply, absolute", 0.0),
-        "air": ("kg/s", "air that the last blow consumed, by its period", 0.0),
+        "air": ("kg/s", "air that the last blow consumed, divided by its period", 0.0),
         "consumed": ("kg", "air consumed since the start", 0.0),
         "vented": ("kg", "air that went through the flushing holes since the start", 0.0),
         "gas_mass": ("kg", "air in the three volumes", 0.0),

@@ -168,7 +168,7 @@ COMPONENT = Component(
         "string_stiffness": (
             0.0,
             "N m/rad",
-            "torque by twist of the string between motor and bit; 0: it does not twist",
+            "torque per twist of the string between motor and bit; 0: it does not twist",
             0.0,
             1e12,
         ),

@@ -82,7 +82,7 @@ def about_errors(scores: Sequence[Score]) -> str:
     return (
         f"± is the error by {step}: twice what half the step changes, and at least "
         f"{100 * WITHIN_A_BLOW:g} % for what goes on within a blow, and one blow's share of depth, "
-        "energy by depth, time off bottom and dry blows where there are any; without it a number "
+        "energy per depth, time off bottom and dry blows where there are any; without it a number "
         "is known to its digits. The error by the cells of the hammer is not in it, nor whether "
         "model and rock are right."
     )

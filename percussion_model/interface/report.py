@@ -75,7 +75,7 @@ HEADLINES: tuple[tuple[str, str, str, str, float], ...] = (
     _of_drillers("percussive_power", "W", "Percussive power (blow energy times frequency)"),
     ("rock_energy", "Energy into the rock, per blow", "J", "J", 1.0),
     ("transfer_efficiency", "Energy transfer efficiency", "–", "%", 1e-2),
-    _of_drillers("specific_energy", "J/m³", "Specific energy (blow energy by volume drilled)"),
+    _of_drillers("specific_energy", "J/m³", "Specific energy (blow energy per volume drilled)"),
     ("penetration_per_blow", "Penetration per blow", "m", "mm", 1e-3),
     ("contacts_per_blow", "Piston/bit contacts per blow", "–", "", 1.0),
     ("drilling_cycles_per_blow", "Drilling cycles per blow", "–", "", 1.0),

@@ -186,7 +186,7 @@ class RockLaw(Parameters):
         le=1e13,
     )
     unloading_ratio: float = quantity(
-        5.0, "-", "gamma: unloading by loading stiffness", ROCK_CRUSHED, gt=1, le=1e4
+        5.0, "-", "gamma: unloading divided by loading stiffness", ROCK_CRUSHED, gt=1, le=1e4
     )
     loading_exponent: float = quantity(
         1.5, "-", "n of the power law: force grows as penetration^n", ROCK_POWER, ge=1, le=4
@@ -383,7 +383,7 @@ class FemOptions(Parameters):
     event_tolerance: float = quantity(
         1e-6,
         "-",
-        "qTol: overshoot of an event function, by its values over the step",
+        "qTol: overshoot of an event function, divided by its size in the step",
         SOLVER_FEM,
         gt=0,
         le=1,
@@ -391,7 +391,7 @@ class FemOptions(Parameters):
     time_tolerance: float = quantity(
         1e-4,
         "-",
-        "tTol: bracket of an event that is narrow enough, by the time step",
+        "tTol: bracket of an event that is narrow enough, divided by the time step",
         SOLVER_FEM,
         gt=0,
         le=1,

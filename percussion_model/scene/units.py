@@ -90,7 +90,7 @@ QUANTITIES = {
     "m^3": Quantity("a volume", ("5e-6", "5 cm^3"), ("cm^3", "l", "in^3")),
     "m^3/s": Quantity("a flow", ("0.001", "60 l/min"), ("l/min", "m^3/min", "cm^3/s")),
     "m^3/s/Pa": Quantity("a leakage", ("1.5e-12", "1.5 cm^3/s/MPa"), ("cm^3/s/MPa", "l/min/bar")),
-    "J/m^3": Quantity("an energy by volume", ("5.5e7", "55 MJ/m^3"), ("MJ/m^3", "J/cm^3")),
+    "J/m^3": Quantity("an energy per volume", ("5.5e7", "55 MJ/m^3"), ("MJ/m^3", "J/cm^3")),
     "kg/s": Quantity(
         "a mass flow, or one of free air",
         ("0.45", "27 kg/min", "20.89 m^3/min"),

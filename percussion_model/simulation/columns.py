@@ -5,7 +5,11 @@ from __future__ import annotations
 from percussion_model.physics.records import BLOW_COLUMNS, LEDGER_COLUMNS, Column
 
 SUMMARY_COLUMNS = (
-    Column("rate_of_penetration", "m/s", "advance of the hole over the counted blows, by time"),
+    Column(
+        "rate_of_penetration",
+        "m/s",
+        "advance of the hole over the counted blows, divided by their time",
+    ),
     Column("rate_of_penetration_standard_error", "m/s", "its error from the scatter of the blows"),
     Column(
         "rate_of_penetration_relative_error", "", "estimated numerical error divided by the rate"
