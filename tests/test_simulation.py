@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from percussion_model import Scene, SceneError, Simulation, SimulationError, simulate
+from percussion_model import Scene, SceneError, Simulation, SimulationError, settled, simulate
 from percussion_model.physics.records import SAMPLE_FIELDS
 from percussion_model.simulation.simulate import sampling_times, stop_on_interrupt
 
@@ -266,6 +266,12 @@ def test_senseless_times_are_refused():
         simulate(SCENES["rigid"], 0.0)
     with pytest.raises(SceneError, match=r"run\.settle"):
         simulate(SCENES["rigid"], 0.5, settle=0.5)
+
+
+@pytest.mark.parametrize("work", [simulate, Simulation, settled])
+def test_a_file_in_place_of_its_scene_is_refused(work):
+    with pytest.raises(SceneError, match=r'"drill.toml": must be a Scene; Scene.from_toml'):
+        work("drill.toml")
 
 
 def test_a_settling_time_that_no_longer_fits_is_shortened_and_said():

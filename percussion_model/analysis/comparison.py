@@ -9,7 +9,7 @@ from typing import Any
 
 from percussion_model.analysis.change import Change, change_of
 from percussion_model.scene.retired import remark
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene, SceneError, refuse_other
 from percussion_model.scene.solver_names import SOLVER_NAMES
 from percussion_model.simulation.result import Result
 from percussion_model.simulation.simulate import simulate
@@ -197,6 +197,7 @@ def compare(
         If a solver cannot compute the scene.
     """
     # Every scene is made before the first is run: a refusal comes at once.
+    refuse_other(scene)
     scenes = {name: scene.computed_by(name) for name in solvers}
     end = scene.run.duration if duration is None else duration
     results = {}

@@ -18,7 +18,7 @@ from percussion_model.physics.settling import (
     multiplier_of,
     request_for,
 )
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene, SceneError, refuse_other
 from percussion_model.simulation.driller_numbers import driller_numbers
 from percussion_model.simulation.error_estimate import with_error_estimate
 from percussion_model.simulation.files import plain
@@ -434,6 +434,7 @@ def _run(scene: Scene) -> Result:
 
 def check_request(scene: Scene, tolerance: float, most_blows: int, scatter: float) -> None:
     """Raise `SceneError` for arguments of `settled` that make no sense."""
+    refuse_other(scene)
     if scene.piston.model == "absent":
         raise SceneError('piston.model = "absent": a bit alone has no blows that could settle')
     if not 0 < tolerance < 1:

@@ -134,6 +134,8 @@ def unpack(path: Path, folder: str, allowance: Allowance) -> Archive:
     allowance : Allowance
         What the archive may take; one that is trusted may name FMUs outside of it.
     """
+    if path.is_dir():
+        raise CouplingError(f"{path}: is a folder: give the archive (.ssp) in it")
     if not path.is_file():
         raise CouplingError(
             f"{path}: no such file; `percussion system {path.stem}` makes it in dist, if it ships"

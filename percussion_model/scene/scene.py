@@ -473,6 +473,12 @@ def _refuse_title(title: Any) -> str:
     return f"title = {show_value(title)}: must be text of up to {LONGEST_TITLE} characters"
 
 
+def refuse_other(given: object) -> None:
+    """Raise `SceneError` for what is no scene, as the name of a file."""
+    if not isinstance(given, Scene):
+        raise SceneError(f"{show_value(given)}: must be a Scene; Scene.from_toml(file) reads one")
+
+
 def refuse_contradictions(scene: Scene) -> None:
     """Raise `SceneError` if parts of a scene contradict each other."""
     of_solver = BODIES.get(scene.solver.name)

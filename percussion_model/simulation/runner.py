@@ -12,7 +12,7 @@ from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.physics.settling import REQUEST, Verdict
 from percussion_model.scene.inputs import SimulationError, check_input
 from percussion_model.scene.rows import is_number
-from percussion_model.scene.scene import Scene
+from percussion_model.scene.scene import Scene, refuse_other
 from percussion_model.solvers.base import Solver, make_solver
 from percussion_model.solvers.state import State
 
@@ -49,6 +49,7 @@ class Runner:
         self, scene: Scene, record_events: bool = True, solver: Solver | None = None
     ) -> None:
         began = time.perf_counter()
+        refuse_other(scene)
         self.record_events = record_events
         self.solver = solver or make_solver(scene)
         self.wall_time = 0.0

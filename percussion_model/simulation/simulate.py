@@ -18,7 +18,7 @@ from percussion_model.physics.ledger import complete_ledger, energies
 from percussion_model.physics.records import BLOW, EVENT, READING, SAMPLE_FIELDS
 from percussion_model.scene.inputs import SimulationError
 from percussion_model.scene.rows import is_number
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene, SceneError, refuse_other
 from percussion_model.scene.solver_names import counted
 from percussion_model.simulation.accuracy_control import (
     LONGEST,
@@ -446,6 +446,7 @@ def _requested(
     error_estimate: bool | None,
 ) -> tuple[Scene, list[str]]:
     """Return the scene with the request of a run in it, and what to warn of."""
+    refuse_other(scene)
     changes = {
         "run.duration": duration,
         "run.settle": settle,

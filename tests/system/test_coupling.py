@@ -205,6 +205,8 @@ def test_times_are_checked(feed_control, duration, step):
 def test_no_archive_is_one_line(tmp_path):
     with pytest.raises(CouplingError, match="no such file"):
         Coupling(tmp_path / "Nothing.ssp")
+    with pytest.raises(CouplingError, match="is a folder: give the archive"):
+        Coupling(tmp_path)
     (tmp_path / "Text.ssp").write_text("text")
     with pytest.raises(CouplingError, match=r"^[^:]*: cannot be unpacked"):
         Coupling(tmp_path / "Text.ssp")
