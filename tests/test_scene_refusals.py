@@ -17,6 +17,7 @@ BAD = {
         "[drive]\nunloading_ratio = 5",
         ("drive.unloading_ratio", "did you mean rock.unloading_ratio?"),
     ),
+    "rock of the library": ('[rock]\nname = "kuru-granite"', ("rock.name: --rock NAME takes",)),
     "shortened key": ("[rock]\nloading = 5", ("did you mean rock.loading_stiffness?",)),
     "unknown key like no other": ("[rock]\nxyzzy = 5", ("rock.xyzzy", "loading_stiffness")),
     "unknown table": ("[rok]\na = 1", ("rok", "did you mean rock?")),

@@ -38,7 +38,10 @@ AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 
 def test_keys_that_no_study_can_vary_are_refused_at_once(key, tmp_path):
     with pytest.raises(SceneError, match=key):
         study(SCENE, grid({key: [1.0]}), tmp_path / "out")
+    with pytest.raises(SceneError, match=r"must be Points; grid\(...\) makes them"):
+        study(SCENE, {key: [1.0]}, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+    assert grid({"feed.force": 3e3}).values.tolist() == [[3e3]]
 
 
 def test_a_point_has_the_numbers_of_settled_and_whole_numbers_stay_whole():

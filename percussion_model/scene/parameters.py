@@ -575,6 +575,8 @@ def unknown_key(key: str) -> str:
         return f"{key}: {BLOW_MAP}"
     if is_counted:
         return f"unknown key {key}: did you mean {counted}? Scenes count from 0, FMUs from 1"
+    if key in ("rock.name", "bit.name"):
+        return f"unknown key {key}: --{parent} NAME takes one of `percussion {parent}s`"
     keys, above = rows_by_key(), generic_key(parent)
     siblings = [one.rpartition(".")[2] for one in keys if one.rpartition(".")[0] == above]
     if parent and (meant := nearest(name, siblings)):

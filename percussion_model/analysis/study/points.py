@@ -12,7 +12,7 @@ import numpy as np
 
 from percussion_model.scene.parameters import find_row, read_number
 from percussion_model.scene.rows import ParameterRow, shortened, toml_value
-from percussion_model.scene.scene import Scene, SceneError
+from percussion_model.scene.scene import Scene, SceneError, refuse_other
 from percussion_model.scene.units import with_point
 
 __all__ = ["Points", "grid", "latin_hypercube", "read_axis", "table"]
@@ -233,6 +233,9 @@ def _snapped(values: np.ndarray) -> np.ndarray:
 
 def refuse_unknown(scene: Scene, points: Points) -> None:
     """Raise `SceneError` for what no point could set, before any of them is run."""
+    refuse_other(scene)
+    if not isinstance(points, Points):
+        raise SceneError(f"points = {points!r:.40}: must be Points; grid(...) makes them")
     for key, column in zip(points.keys, points.values.T, strict=True):
         row = scene.row_of(key)
         _refuse_no_number(row, key)
@@ -245,7 +248,11 @@ def refuse_unknown(scene: Scene, points: Points) -> None:
 
 
 def _column(key: str, values: Any) -> np.ndarray:
-    if not isinstance(values, str) and any(isinstance(value, str) for value in values):
+    if (
+        np.iterable(values)
+        and not isinstance(values, str)
+        and any(isinstance(value, str) for value in values)
+    ):
         values = [read_number(key, one) if isinstance(one, str) else one for one in values]
     try:
         column = np.atleast_1d(np.asarray(values, dtype=float))
