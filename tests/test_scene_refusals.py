@@ -9,6 +9,7 @@ from percussion_model.scene.scene import Scene, SceneError
 BAD = {
     "syntax": ("[rock\nunloading_ratio = 5", ("not valid TOML", "line 1")),
     "syntax on a later line": ('title = "x"\n[rock]\na = = 5', ("not valid TOML", "line 3")),
+    "a result": ('{"scene": {}}', ("JSON", "must be a scene in TOML")),
     "unknown key": (
         "[rock]\nunloading_rato = 5",
         ("rock.unloading_rato", "did you mean rock.unloading_ratio?"),

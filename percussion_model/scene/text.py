@@ -94,6 +94,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     except RecursionError:
         raise SceneError(f"{path}: tables or lists are nested too deep") from None
     except tomllib.TOMLDecodeError as error:
+        if text.lstrip().startswith("{"):
+            raise SceneError(f"{path}: JSON, as results are: must be a scene in TOML") from None
         raise SceneError(f"{path}: not valid TOML: {_about_fault(str(error), text)}") from None
     except ValueError:
         raise SceneError(
