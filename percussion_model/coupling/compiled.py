@@ -68,9 +68,8 @@ class CompiledSteps:
         self._places: list[int] = []
         groups = [g for port in ports for g in (*port.writer.groups, *port.reader.groups)]
         room = sum(group.end - group.begin for group in groups)
-        # no number is equal to these: all inputs are set in the first step
-        self._reals = np.full(room, np.nan)
-        self._integers = np.full(room, np.iinfo(np.int32).min, np.int32).view(INTEGER)
+        self._reals, self._integers = np.empty(room), np.empty(room, np.int32).view(INTEGER)
+        self._forget()
         self._room = 0
         for port in ports:
             self._set_and_step(port)
@@ -84,16 +83,33 @@ class CompiledSteps:
         self._where = np.array(self._places, np.int64)
         sizes = len(self._all), len(self._where), len(self._values), room
         self._at = np.array([0, count, DONE, 0, *sizes], np.int64)
-        arrays = (
-            self._all, self._where, self._values, self._reals, self._integers, self._at,
-        )  # fmt: skip
-        addresses = [one.ctypes.data for one in arrays]
+        self._exchange_once()
+        addresses = self._addresses(self._all, self._values, self._at)
         make = entries_of("calls").run
 
         def go(until: int) -> None:
             make(*addresses, until, start, step)
 
         self._go = go
+
+    def _addresses(self, *arrays: np.ndarray) -> list[int]:
+        calls, values, at = arrays
+        used = calls, self._where, values, self._reals, self._integers, at
+        return [one.ctypes.data for one in used]
+
+    def _forget(self) -> None:
+        """Set all inputs in the next step: no number is equal to these."""
+        self._reals[:] = np.nan
+        self._integers["value"] = np.iinfo(np.int32).min
+
+    def _exchange_once(self) -> None:
+        """Set and read all, so that the first step has not to bring all of it into memory."""
+        calls = self._all[self._all["kind"] != STEP]
+        values, at = self._values.copy(), self._at.copy()
+        at[At.CALLS] = len(calls)
+        entries_of("calls").run(*self._addresses(calls, values, at), 1, 0.0, 0.0)
+        if at[At.FAILED_CALL] != DONE:  # which the first step tells
+            self._forget()
 
     def _set_and_step(self, port: Port) -> None:
         for group in port.writer.groups:
