@@ -30,6 +30,7 @@ from lxml import etree
 from percussion_model.coupling.calls import LARGEST, WARNING
 from percussion_model.scene.retired import remark
 from percussion_model.scene.rows import nearest, shortened, unit_suffix
+from percussion_model.scene.units import UnitError, in_si
 
 # Number of a bar or a section within a key of a scene, and one in either way of writing.
 _PLACE = re.compile(r"\.([0-9]{1,4})(?=\.|$)")
@@ -126,13 +127,22 @@ def number_of_word(component: str, variable: Any, word: str) -> int:
     found = numbers_of_words(variable)
     if word not in found:
         unit = unit_suffix(variable.unit or "").replace(" ", " in ", 1)
-        number = f"a number{unit}, with a decimal point and no unit"
+        number = f"a number{unit}, with a decimal point"
         kind = {"Boolean": "true or false"}.get(variable.type, number)
         raise CouplingError(
             f"{component}.{variable.name} = {shortened(word)}: must be "
             f"{', '.join(found) or kind}{remark(variable.name, word)}"
         )
     return found[word]
+
+
+def number_of_text(component: str, variable: Any, text: str) -> float:
+    """Number of a text: of a word of an enumeration, or with its unit."""
+    if FAMILIES[kind_of(variable)] == "Real":
+        with contextlib.suppress(UnitError):
+            unit = "-" if variable.unit in (None, "", "1") else variable.unit
+            return in_si(text, unit.replace(".", " "))
+    return number_of_word(component, variable, text)
 
 
 def check_library(name: str, folder: Path, identifier: str, platform: str) -> None:
@@ -369,7 +379,7 @@ class Component:
                 self._guarded(self.slave.setString, [one.valueReference], [value])
                 continue
             if isinstance(value, str):
-                value = number_of_word(self.name, one, value)
+                value = number_of_text(self.name, one, value)
             self.writer([name]).write([self._converted(one, value)])
 
     def _converted(self, one: Any, value: Any) -> Any:

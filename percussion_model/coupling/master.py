@@ -20,7 +20,13 @@ from typing import Any, Literal
 import numpy as np
 
 from percussion_model.coupling.compiled import CompiledSteps, can_compile
-from percussion_model.coupling.component import Component, CouplingError, naming, read_description
+from percussion_model.coupling.component import (
+    Component,
+    CouplingError,
+    naming,
+    number_of_text,
+    read_description,
+)
 from percussion_model.coupling.component3 import Component3
 from percussion_model.coupling.coupled_run import JUDGED, CoupledRun, known_signals
 from percussion_model.coupling.port import (
@@ -49,6 +55,9 @@ DESCRIPTION = "modelDescription.xml"
 AT_ONCE = 200
 # A number of steps is whole if it misses by no more than this.
 ROUNDING = 1e-9
+# Parameter of parts whose steps must all be of a length known beforehand, as a string of waves,
+# and their input from the part of which that holds too.
+STEP, TIMED = "communication_step", "returned_begin"
 
 
 class Coupling:
@@ -140,7 +149,7 @@ class Coupling:
             else:
                 kind = {"2.0": Component, "3.0": Component3}[description.fmiVersion]
                 self.parts[name] = kind(name, folders[name], description)
-        self._parameters = values
+        self._parameters, self._asked = values, given
         for signal, value in given.items():  # before those of the archive
             component, variable = place_of(signal, descriptions)
             if component not in values and component in descriptions:
@@ -210,6 +219,7 @@ class Coupling:
                     "changes"
                 )
             self._refuse_contradictions(count, tolerance)
+            self._tell_of_step(step, tolerance)
             if self.remark and tell is not None:
                 tell(self.remark)
             self._connect([*signals, *known_signals(self.outputs, JUDGED)])
@@ -234,6 +244,27 @@ class Coupling:
             )
         refuse_remainder(self.every, self.parts, count)
 
+    def _tell_of_step(self, step: float, tolerance: float | None) -> None:
+        """Give parts that want to know it the length of the steps [s], which they all must have."""
+        for name, part in self.parts.items():
+            if not isinstance(part, Component) or not {STEP, TIMED} <= part.variables.keys():
+                continue
+            signal = f"{name}.{STEP}"
+            if tolerance is not None:
+                raise CouplingError(f"tolerance {tolerance:g} and {signal}, a fixed step, do not "
+                                    "go together: omit --tolerance")  # fmt: skip
+            partners = {link.source for link in self._links[name] if link.input == TIMED}
+            for slow in self.every.keys() & {name, *partners}:
+                raise CouplingError(f"every {slow}={self.every[slow]}: {slow} exchanges waves, in "
+                                    "steps of the run: omit --every of it")  # fmt: skip
+            asked = self._asked.get(signal, step)
+            if isinstance(asked, str):
+                asked = number_of_text(name, part.variables[STEP], asked)
+            if abs(asked - step) > ROUNDING * step:
+                raise CouplingError(f"{signal} = {asked:g} s: must be the step of the run, "
+                                    f"{step:g} s (--step), or omitted")  # fmt: skip
+            self._parameters[name][STEP] = step
+
     def _loop(
         self,
         count: int,
@@ -244,7 +275,7 @@ class Coupling:
     ) -> CoupledRun:
         names = [f"{port.name}.{name}" for port in self.ports for name in port.taken + port.kept]
         start = self.start
-        rows, jumps = [[start, *self._row()]], Jumps(self.ports, self.every)
+        rows, jumps = [[start, *self._row()]], Jumps(self.ports, self.every, self._by_waves())
         go, error, done, interrupted = self._stepping(count, step, control), "", 0, False
         began, used = clock.perf_counter(), clock.process_time()
         with stop_on_interrupt(keep=True) as stop:
@@ -276,6 +307,16 @@ class Coupling:
         if control is not None:
             run.steps, run.tried, run.rejected = control.done, control.tried, control.rejected
         return run
+
+    def _by_waves(self) -> set[tuple[str, str]]:
+        """Outputs that go from a part to its partner in waves alone: forces act by these there."""
+        found: set[tuple[str, str]] = set()
+        others: set[tuple[str, str]] = set()
+        for links in self._links.values():
+            partners = {link.source for link in links if link.input == TIMED}
+            for link in links:
+                (found if link.source in partners else others).add((link.source, link.output))
+        return found - others
 
     def _stepping(
         self, count: int, step: float, control: StepControl | None

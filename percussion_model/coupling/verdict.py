@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -50,9 +50,16 @@ class Jumps:
     ports : sequence of Port
     every : mapping
         Steps that a part does as one, by component.
+    idle : collection, optional
+        Component and name of outputs that do not act where they go.
     """
 
-    def __init__(self, ports: Sequence[Port], every: Mapping[str, int]) -> None:
+    def __init__(
+        self,
+        ports: Sequence[Port],
+        every: Mapping[str, int],
+        idle: Collection[tuple[str, str]] = (),
+    ) -> None:
         units = [_units(port) for port in ports]
         is_force = any("N" in of_port.values() for of_port in units)
         self._names: list[str] = []
@@ -61,6 +68,8 @@ class Jumps:
         for port, of_port in zip(ports, units, strict=True):
             for k, name in enumerate(port.taken):
                 unit = of_port.get(name)
+                if (port.name, name) in idle:
+                    continue
                 if (unit == "N") if is_force else unit is not None:
                     self._names.append(f"{port.name}.{name}")
                     self._places.append(port.begin + k)

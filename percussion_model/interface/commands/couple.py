@@ -52,23 +52,21 @@ ROWS = 5000
 MOST_DIGITS = 9
 
 
+def _time(option: str, words: str) -> Any:
+    return common.number_option(option, "TIME", "run.duration", words)
+
+
+_DURATION = f"Simulated time, in s or with its unit; else that of the archive, or {DURATION:g}."
+_START = "Time of the start; else that of the archive, or 0."
+_INTERVAL = f"Time between rows; else {ROWS} rows."
+
+
 def couple(
     system: SystemFile,
-    duration: Annotated[
-        float | None,
-        typer.Option(
-            "--duration",
-            help=f"Simulated time, in s; else that of the archive, or {DURATION:g}.",
-        ),
-    ] = None,
-    start: Annotated[
-        float | None,
-        typer.Option("--start", help="Time of the start, in s; else that of the archive, or 0."),
-    ] = None,
-    step: Annotated[float, typer.Option("--step", help="Communication step, in s.")] = 1e-3,
-    interval: Annotated[
-        float | None, typer.Option("--interval", help=f"Time between rows, in s; else {ROWS} rows.")
-    ] = None,
+    duration: Annotated[float | None, _time("--duration", _DURATION)] = None,
+    start: Annotated[float | None, _time("--start", _START)] = None,
+    step: Annotated[float, _time("--step", "Communication step.")] = 1e-3,
+    interval: Annotated[float | None, _time("--interval", _INTERVAL)] = None,
     order: Annotated[
         Literal["jacobi", "gauss-seidel"], typer.Option(help="Who sees what in a step.")
     ] = "jacobi",
@@ -137,7 +135,7 @@ def couple(
         for line in _lines(found):
             typer.echo(line)
     common.list_files([path])
-    if figures:
+    if figures and run.steps:  # else there is nothing to draw
         with common.if_drawable():
             with progress("drawing the figure"):
                 # to load what draws takes its time too
