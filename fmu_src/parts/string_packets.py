@@ -19,6 +19,8 @@ from percussion_model.physics.kernel import kernel
 
 # Polynomials that make up a wave within a cell or a communication step.
 DEGREES = 8
+# A wave keeps its energy to this share; that of its varying part is made so much larger at most.
+KEPT, MOST = 1e-12, 10.0
 # Rounds of Newton's method, more than double precision takes.
 ROUNDS = 8
 
@@ -106,27 +108,52 @@ def value_at(shares, at, x):
 def project(shares, at, begin, span, found, to, since, long):
     """Add a wave over one time to the sums of its projection on another time.
 
-    A projection never has more energy than what it is of (Bessel).
-
     Parameters
     ----------
     shares, at : array, int
         The wave, from `begin` over `span` [s].
     found, to : array, int
         Sums, over the time from `since` on, `long` [s].
+
+    Returns
+    -------
+    squared : float
+        What the wave adds to the mean square over that time [m2/s2].
     """
-    low = max(since, begin)
+    low, squared = max(since, begin), 0.0
     both = min(since + long, begin + span) - low
     if both <= 0.0:
-        return
+        return squared
     for i in range(DEGREES):
         t = low + 0.5 * both * (PLACES[i] + 1.0)
         value = value_at(shares, at, 2.0 * (t - begin) / span - 1.0)
-        value *= both / long * WEIGHTS[i]
+        share = both / long * WEIGHTS[i] * value
+        squared += 0.5 * share * value
         before, now, x = 0.0, 1.0, 2.0 * (t - since) / long - 1.0
         for k in range(DEGREES):
-            found[to + k] += (k + 0.5) * value * now
+            found[to + k] += (k + 0.5) * share * now
             before, now = now, FORTH[k] * x * now - BACK[k] * before
+    return squared
+
+
+@kernel
+def keep_energy(waves, at, squared):
+    """Scale what a projection has besides its mean, so that it has the mean square given [m2/s2].
+
+    It has less by itself (Bessel); the mean, which is momentum, stays.
+
+    Returns
+    -------
+    lacking : float
+        Mean square that it cannot have, below 0 where the mean alone has more.
+    """
+    mean = waves[at] * waves[at]
+    varies, wanted = square(waves, at) - mean, max(squared - mean, 0.0)
+    if varies > 0.0 and abs(wanted - varies) > KEPT * squared:
+        scale = math.sqrt(min(wanted / varies, MOST))
+        for k in range(1, DEGREES):
+            waves[at + k] *= scale
+    return squared - square(waves, at)
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 What crosses a communication point is the wave that goes down the lowest rod over the next step,
 known since rods delay it, and the one that has come up over the last: sums of Legendre
-polynomials, whose projections can only lose energy. So the coupling makes none, whatever the
-hammer does (docs/system.md, section 4). Steps may be as long as the rods delay a wave.
+polynomials, scaled to the energy of what they are of. So the coupling makes and loses none,
+whatever the hammer does (docs/system.md, section 4). Steps may be as long as the rods delay a wave.
 """
 
 from __future__ import annotations
@@ -87,6 +87,8 @@ def begin(p, u, s, w):
 def step(p, u, s, w, h):
     """Take what the hammer has sent, move the rods as far as that is known, and give."""
     span, cell = p.communication_step, body.step_of(p)
+    if h <= ROUNDING * span:  # what some masters add to come to the end
+        return 0
     if abs(h - span) > ROUNDING * span:
         w.facts[0], w.facts[1] = h, span
         return OTHER_STEP
@@ -96,15 +98,20 @@ def step(p, u, s, w, h):
     down, up, head, free = down_at(p), up_at(p), s.head, free_cells(p)
     while s.clock + cell <= s.known_until + ROUNDING * span:
         packets.clear(w.made, COMING)
+        squared = 0.0
         for k in range(s.returned):
             at = k * PACKET
-            packets.project(w.moving, at + 1, w.moving[at], span, w.made, COMING, s.clock, cell)
+            squared += packets.project(
+                w.moving, at + 1, w.moving[at], span, w.made, COMING, s.clock, cell
+            )
+        packets.keep_energy(w.made, COMING, squared)
         packets.advance_packets(p, s, w, down, up, u.head_force, free)
         s.clock += cell
     forget(p, s, w)
     s.head_work += u.head_force * (s.head - head)
     s.head_impulse += u.head_force * span
-    s.time += span
+    s.steps += 1.0
+    s.time = s.steps * span  # as the host has it, without rounding of a sum
     give(p, s, w)
     s.mean_push += (1.0 - exp(-span / p.feed_filter)) * (u.push - s.mean_push)
     return add_rod(p, s, w) if body.is_wanted(p, u, s) else 0
@@ -128,6 +135,9 @@ def take(p, u, s, w):
     x[at + 1], x[at + 2], x[at + 3] = u.returned_1, u.returned_2, u.returned_3
     x[at + 4], x[at + 5], x[at + 6] = u.returned_4, u.returned_5, u.returned_6
     x[at + 7], x[at + 8] = u.returned_7, u.returned_8
+    if u.returned_square > 0.0:  # else the hammer does not tell
+        lacking = packets.keep_energy(x, at + 1, u.returned_square - s.debt)
+        s.debt = max(-lacking, 0.0)
     s.returned += 1
     s.known_until = start + span
     s.taken += span * packets.square(x, at + 1)
@@ -156,9 +166,12 @@ def give(p, s, w):
     span, cell, cells = p.communication_step, body.step_of(p), s.count * p.rod_cells
     ahead = max(math.floor((s.time - s.clock) / cell), 0)
     packets.clear(s.wave, 0)
+    squared = 0.0
     for k in range(ahead, min(ahead + 2 + math.ceil(span / cell), cells)):
         packets.leave(p, s, w, down_at(p), k, COMING)
-        packets.project(w.made, COMING, s.clock + k * cell, cell, s.wave, 0, s.time, span)
+        begin = s.clock + k * cell
+        squared += packets.project(w.made, COMING, begin, cell, s.wave, 0, s.time, span)
+    packets.keep_energy(s.wave, 0, squared)
     s.wave_begin = s.time
     s.given += span * packets.square(s.wave, 0)
 
@@ -210,16 +223,19 @@ def state_fault(p, s, w):
 
 
 # Time of the last communication point, up to which the rods have gone, a step or two behind, and up
-# to which waves have come up; how many of those are kept; the wave that is given; energies of waves
-# given and taken, divided by impedance.
+# to which waves have come up; steps that were done; how many of those waves are kept; the wave that
+# is given; energies of waves given and taken, divided by impedance; mean square that the last one
+# has too much [m2/s2].
 LAW = Law(
     state={
         **body.STATE,
         **dict.fromkeys(("time", "clock", "known_until", "wave_begin"), (0.0, LATEST)),
+        "steps": (0.0, 1e15),
         "returned": (0, 2**31 - 1),
         "wave": (*NUMBER, DEGREES),
         **dict.fromkeys(
-            ("given", "taken", "mean_push", "head_work", "head_impulse", "port_work"), NUMBER
+            ("given", "taken", "debt", "mean_push", "head_work", "head_impulse", "port_work"),
+            NUMBER,
         ),
     },
     begin=begin,
@@ -256,6 +272,7 @@ TABLE = PartTable(
             name: ("m/s", -1e4, 1e4, 0.0, f"share of polynomial {k} of the wave that comes up")
             for k, name in enumerate(_UP)
         },
+        "returned_square": ("m^2/s^2", 0.0, 1e8, 0.0, "mean square of the wave that comes up"),
         "add_rod": ("", 0, 1, False, "a rising edge adds a rod, where rod_wanted"),
     },
     outputs={

@@ -7,8 +7,9 @@ one of u = v - d goes back up (d'Alembert). The rod pushes with Z (d - u), so th
 
 with the feed F, the reaction R of the drive, and the push S of the shoulder on the bit. Over a
 step of whoever has the rod, d comes as a sum of Legendre polynomials, and what goes back is given
-as one: its projection, which never has more energy than the wave itself (Bessel), so the port
-makes none. Whatever S misses while it is held is made good by the next.
+as one: its projection, and its energy, which is that of d less the work on the casing. So whoever
+has the rod can keep to it, and the port makes and loses none. Whatever S misses while it is held
+is made good by the next.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ TERMS = 17
 PLACES = 0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263
 WEIGHTS = 0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692
 # Polynomials that make up a wave. A step is over this close to its end, and the next one begins.
-DEGREES, ROUNDING, EARLY = 8, 1e-9, 1e-3
+DEGREES, ROUNDING, EARLY = 8, 1e-9, 1e-4
 
 
 @inlined
@@ -139,6 +140,12 @@ def divided(w, at):
 
 
 @inlined
+def value_of(w, at):
+    """Value of a polynomial at a place."""
+    return divided(w, at).h
+
+
+@inlined
 def about(w, at, scale):
     """A polynomial by powers of the distance from a place, divided by a scale."""
     a = divided(w, at)
@@ -165,6 +172,16 @@ def value_beyond(s):
 
 
 @inlined
+def square_of(s):
+    """Mean square of the wave that comes down [m2/s2]."""
+    a, b = s.shoulder_now_1 * s.shoulder_now_1, s.shoulder_now_2 * s.shoulder_now_2
+    c, d = s.shoulder_now_3 * s.shoulder_now_3, s.shoulder_now_4 * s.shoulder_now_4
+    e, f = s.shoulder_now_5 * s.shoulder_now_5, s.shoulder_now_6 * s.shoulder_now_6
+    g, h = s.shoulder_now_7 * s.shoulder_now_7, s.shoulder_now_8 * s.shoulder_now_8
+    return a + b / 3.0 + c / 5.0 + d / 7.0 + e / 9.0 + f / 11.0 + g / 13.0 + h / 15.0
+
+
+@inlined
 def take_wave(s):
     """Go by the wave that is given, once its step begins: a master may give it a step early.
 
@@ -179,6 +196,8 @@ def take_wave(s):
     s.shoulder_now_3, s.shoulder_now_4 = s.shoulder_wave_3, s.shoulder_wave_4
     s.shoulder_now_5, s.shoulder_now_6 = s.shoulder_wave_5, s.shoulder_wave_6
     s.shoulder_now_7, s.shoulder_now_8 = s.shoulder_wave_7, s.shoulder_wave_8
+    if starts:
+        s.shoulder_returned_square = square_of(s)
 
 
 @inlined
@@ -239,24 +258,25 @@ def move_casing(par, s, at, reach, h, force):
         wave = about(powers_of(s), at, reach)
     fall = s.shoulder_impedance * h / par.shoulder_casing_mass
     own, term, v, way = force * h / par.shoulder_casing_mass, s.shoulder_velocity, 0.0, 0.0
-    up, down, powers = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0, 1.0)
+    up, powers, before = (0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0, 1.0), term
     for n in range(TERMS):
         given = wave[n] if n < DEGREES else 0.0
         v, way = v + term, way + term / (n + 1.0)
-        up, down, powers = (
-            plus(up, term - given, powers),
-            plus(down, given, powers),
-            next_powers(powers),
-        )
+        up, powers = plus(up, term - given, powers), next_powers(powers)
         term = (2.0 * fall * given + own - fall * term) / (n + 1.0)
         own = 0.0
     for k in range(4):
-        share = WEIGHTS[k] * s.shoulder_impedance * h
-        s.shoulder_rod_work += share * (down[k] * down[k] - up[k] * up[k])
         if going_on:
             give_back(s, at + PLACES[k] * reach, reach * WEIGHTS[k] * up[k])
         else:
-            s.shoulder_over += h * WEIGHTS[k] * up[k]
+            s.shoulder_over += h * WEIGHTS[k] * (up[k] - wave.a)
+    # what the casing has gained, but for the other forces
+    work = 0.5 * par.shoulder_casing_mass * (v - before) * (v + before) - force * (way * h)
+    s.shoulder_rod_work += work
+    if s.shoulder_impedance > 0.0:
+        square = work / (s.shoulder_impedance * s.shoulder_wave_span)
+        s.shoulder_returned_square -= square if going_on else 0.0
+        s.shoulder_over_square += 0.0 if going_on else square
     s.shoulder_velocity = v
     s.shoulder_position += way * h
 
@@ -269,14 +289,16 @@ def follow(par, s, h):
     span = max(s.shoulder_wave_span, LEAST_DIVISOR)
     take_wave(s)
     # what is read a moment late is still that of the step before
-    late = s.shoulder_returned_until + h - s.shoulder_now_begin
-    if s.shoulder_now_begin != s.shoulder_returned_begin and late > EARLY * span:
-        s.shoulder_returned_begin = s.shoulder_now_begin
+    later = s.shoulder_now_begin - s.shoulder_returned_begin
+    if later != 0.0 and s.shoulder_since + h - later > EARLY * span:
+        s.shoulder_returned_begin, s.shoulder_since = s.shoulder_now_begin, s.shoulder_since - later
         forget_returned(s)
-        # bodies may be past the begin already
-        late = (s.shoulder_returned_until - s.shoulder_returned_begin) / span
-        give_back(s, late - 1.0, 2.0 * s.shoulder_over / span)
-        s.shoulder_over = 0.0
+        # bodies may be past the begin already, by another wave: its force is made good
+        late = max(s.shoulder_since / span, 0.0)
+        wave = value_of(powers_of(s), late - 1.0)
+        give_back(s, late - 1.0, 2.0 * (s.shoulder_over / span + late * wave))
+        s.shoulder_returned_square = square_of(s) - s.shoulder_over_square
+        s.shoulder_over = s.shoulder_over_square = 0.0
     recoil, before = s.i_drive + s.i_on_bit, s.shoulder_squeeze
     if s.shoulder_returned_until == 0.0:
         before = par.shoulder_start_force / stiffness(par)
@@ -287,7 +309,7 @@ def follow(par, s, h):
     most, left, end = min(PIECE * span, swift), h, 1.0 - ROUNDING
     while left > 0.0:
         piece = min(most, left)
-        at = min(2.0 * (s.shoulder_returned_until - s.shoulder_returned_begin) / span - 1.0, 1.0)
+        at = min(2.0 * s.shoulder_since / span - 1.0, 1.0)
         reach = 2.0 * piece / span
         if at < end < at + reach:
             reach = 1.0 - at
@@ -295,8 +317,9 @@ def follow(par, s, h):
         elif at >= end:
             at = 1.0
         move_casing(par, s, at, reach, piece, force)
-        s.shoulder_returned_until += piece
+        s.shoulder_since += piece
         left -= piece
+    s.shoulder_returned_until = s.shoulder_returned_begin + s.shoulder_since
     after = squeeze(par, s)
     rate = (after - before) / h
     due = push_by(par, before, rate) + push_by(par, after, rate)
@@ -349,6 +372,7 @@ COMPONENT = Component(
             f"returned_{k + 1}": ("m/s", f"{_part_of_wave(k)} that goes up", 0.0)
             for k in range(DEGREES)
         },
+        "returned_square": ("m^2/s^2", "mean square of the wave that goes up, once whole", 0.0),
         "returned_begin": ("s", "begin of the step whose wave is in returned_1 to returned_8", 0.0),
         "returned_until": ("s", "time up to which the wave that goes up is known", 0.0),
         "rod_work": ("J", "work of the rod on the casing", 0.0),
@@ -356,7 +380,7 @@ COMPONENT = Component(
     pass_time=pass_time,
     inputs=("impedance", "wave_begin", "wave_span", *(f"wave_{k + 1}" for k in range(DEGREES))),
     hidden=(
-        *("owed", "recoil", "squeeze", "over", "now_begin"),
+        *("owed", "recoil", "squeeze", "over", "over_square", "since", "now_begin"),
         *(f"now_{k + 1}" for k in range(DEGREES)),
     ),
     needs={"feed.on": ("bit",), "effects.damper": (False,)},
