@@ -200,6 +200,11 @@ class EngineSolver(Solver):
         self.wave_speed_error = float(head["wave_speed_error"])
         self.operator_bytes = motion.table_bytes
 
+    @property
+    def _par(self) -> np.ndarray:
+        """Parameters of the motion, as an array of one record."""
+        return self._motion.parameters(self.PAR)
+
     def vary(self, changes: list[tuple[int, float]]) -> bool:
         """Compute another scene, which differs in some numbers of the image; states go on no more.
 

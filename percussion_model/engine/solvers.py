@@ -123,7 +123,7 @@ class FemSolver(EngineSolver):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self.loss_time = float(self._motion.parameters(self.PAR)[0]["eta"])
+        self.loss_time = float(self._par[0]["eta"])
 
     def set_inputs(self, state: State, **inputs: float) -> None:
         """Change inputs of a committed state; modes may have to follow."""
