@@ -28,7 +28,7 @@ from percussion_model.analysis.identify.observation import (
     Q,
     Table,
 )
-from percussion_model.analysis.identify.plan import ROOM, slopes_of
+from percussion_model.analysis.identify.plan import slopes_of
 from percussion_model.analysis.identify.prior import prior_of
 from percussion_model.analysis.identify.profile import SURE, Profile, identify
 from percussion_model.analysis.identify.synthetic import (
@@ -166,17 +166,23 @@ def campaign(
         schedule = schedule[1:2]
     if exact:
         first = make_hole(truth, prior, schedule, 0)
-        table = replace(identify(first.log, own, ROCK, room=ROOM).table, errors=EXACT)
+        table = replace(identify(first.log, own, ROCK).table, errors=EXACT)
     found = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in seeds:
             hole = make_hole(truth, prior, schedule, seed, table=table if exact else None)
             path = Path(folder) / f"hole_{seed}.csv"
             path.write_text(csv_text(hole), encoding="utf-8")
-            profile = identify(read_log(path), own, ROCK, table=table, room=ROOM)
+            profile = identify(read_log(path), own, ROCK, table=table)
             table = profile.table
             found.append(score(hole, profile))
     return found
+
+
+def allowed(scores: list[Score]) -> float:
+    """Share of layers that the bound lets be within `WITHIN`."""
+    least = np.concatenate([one.bounds for one in scores])
+    return float(np.mean([math.erf(WITHIN / (math.sqrt(2.0) * one)) for one in least]))
 
 
 def cells(scores: list[Score]) -> dict[str, str]:
@@ -196,7 +202,6 @@ def cells(scores: list[Score]) -> dict[str, str]:
     ]
     found = sum(one.found for one in scores)
     least = np.concatenate([one.bounds for one in scores])
-    allowed = np.mean([math.erf(WITHIN / (math.sqrt(2.0) * one)) for one in least])
     spread = 100 * np.median([one.spread for one in scores])
     return {
         "holes; layers behind others; found": f"{len(scores)}; {len(errors)}; {found}",
@@ -206,7 +211,7 @@ def cells(scores: list[Score]) -> dict[str, str]:
         f"samples to {AFTER:g} m below a top": f"{np.median(samples):.0f}",
         f"error there, median; layers within {100 * WITHIN:g} %": shares[0],
         "the same by the bound of any estimator": f"{67 * np.median(least):.1f} %; "
-        f"{100 * allowed:.1f} %",
+        f"{100 * allowed(scores):.1f} %",
         "the same of the usual index, its scale from the truth of each hole": shares[1],
         "the same, one scale for all holes": shares[2],
         "holes in which the renewal length is said to be shown": f"{sum(o.told for o in scores)}",
