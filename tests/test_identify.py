@@ -121,7 +121,7 @@ def test_of_linear_signals_the_filter_is_bayes(rigid):
     random = np.random.default_rng(2)
     table = Linear(
         slopes=random.normal(size=(3, 6)), turning=random.normal(size=(3, 6)),
-        errors=np.array([0.02, 0.01, 0.05]), stretch=np.ones(4), half=np.ones(4),
+        errors=np.array([0.02, 0.01, 0.05]), stretch=np.ones(2), half=np.ones(4),
         nodes=(),
     )  # fmt: skip
     mean, spread = random.normal(size=6), np.full(6, 0.6)

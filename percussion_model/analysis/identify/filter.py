@@ -38,16 +38,17 @@ from percussion_model.analysis.identify.observation import (
 COUNT = len(UNKNOWNS)
 # What stays in a new layer but for this share of the prior's standard deviation; the other
 # unknowns are those of any rock again, and of q no less is unknown than so (by the logarithm).
-SLOW, LEAP, LEAST_SPREAD = [RENEWAL, THRESHOLD, FRICTION], 0.25, 0.5
+SLOW, LEAP, LEAST_SPREAD = [RENEWAL, THRESHOLD, FRICTION], 0.2, 0.5
 # Settings within this are alike (by the logarithm): they are gathered. The table's errors of
-# pressures and feeds go together up to about the second; the motion knows of no rotation.
-ALIKE, TOGETHER = 0.05, np.array([0.5, 0.5, np.inf])
+# pressures and feeds go together up to about the second, as those of 200 rocks of a hammer showed;
+# the motion knows of no rotation.
+ALIKE, TOGETHER = 0.05, np.array([0.15, 0.15, np.inf])
 MOST_GROUPS = 8
 # Hole in which samples lose 63 % of their weight [m].
-FORGOTTEN = 4.0
+FORGOTTEN = 8.0
 # Errors of a sample that count; beyond, a sample weighs less, as an outlier. One at the edge of a
 # group may belong to its neighbour, and be off by so many.
-HUBER, EDGE = 2.5, 3.0
+HUBER, EDGE = 2.5, 1.5
 # By how many of the first a sample counts for a change of layer: two outliers in four make none.
 HELD = 1.6
 # Samples whose mean is held against what is known, and how many standard deviations make a layer:
@@ -55,6 +56,8 @@ HELD = 1.6
 WINDOWS, LAYER = (4, 8, 16, 32, 64), 5.0
 MEMORY = max(WINDOWS)
 FEWEST = 2  # of a new layer
+# Less hole between two changes is one change, of signals that lag behind each other [m].
+THIN = 0.2
 # Samples behind a change of layer before the next is looked for; those that make a mean that is
 # known by itself; behind so many, what is known is renewed with each fifth alone.
 PAUSE, KNOWN, SOON, SELDOM = 8, 6.0, 20, 5
@@ -121,7 +124,7 @@ class RockFilter:
         self.spread[Q] = max(self.spread[Q], LEAST_SPREAD)
         noise = noise or Noise()
         self.noise, self.varies = noise.values(), noise.varies
-        fine = self.spread[OF_CELL] * (table.stretch / table.half)[2:]
+        fine = self.spread[OF_CELL] * table.stretch / table.half[2:]
         least = CELLS if len(table.nodes) else FEW_CELLS
         counts = cells or np.clip(least * fine / fine.min(), least, MOST_CELLS).astype(int)
         axes, own = zip(*map(_axis, counts), strict=True)
@@ -145,7 +148,7 @@ class RockFilter:
         self.groups = self.before = np.empty((0, GROUP))
         self.memory = np.empty((0, SAMPLE))
         self.local: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
-        self.since = 0
+        self.since, self.deep = 0, 0.0
         self._gather(self.known)
 
     def _gather(self, likely: np.ndarray) -> None:
@@ -183,6 +186,7 @@ class RockFilter:
         return ago
 
     def _take(self, deeper: float, settings: np.ndarray, signals: np.ndarray) -> None:
+        self.deep += deeper
         self.groups, row = _with_group(self.groups, settings)
         expected, variance = row[_MEANS], self._own(np.maximum(row[_WEIGHTS], 1.0))
         if row[_WEIGHTS][RATE] < KNOWN:
@@ -301,17 +305,19 @@ class RockFilter:
 
     def _begin_layer(self, ago: int) -> None:
         """Go back by some samples, forget what a new layer may change, and take them again."""
-        again = self.memory[-ago:]
-        self.groups = _added(self.before, self.memory[:-ago])
-        self.solve()
-        x, p = self.mean.copy(), np.diag(self.spread**2)
-        slow = np.ix_(SLOW, SLOW)
-        x[SLOW], p[slow] = self.x[SLOW], self.p[slow] + np.diag((LEAP * self.spread[SLOW]) ** 2)
+        again, before = self.memory[-ago:], self.memory[:-ago]
+        x, p, slow = self.mean.copy(), np.diag(self.spread**2), np.ix_(SLOW, SLOW)
+        if self.deep - again[:, 0].sum() < THIN:
+            x[SLOW], p[slow] = self.x0[0, SLOW], self.p0[slow]
+        else:
+            self.groups = _added(self.before, before)
+            self.solve()
+            x[SLOW], p[slow] = self.x[SLOW], self.p[slow] + np.diag((LEAP * self.spread[SLOW]) ** 2)
+            self.layers += 1
         self._start(x, p)
         for one in again:
             signals = np.where(one[_WEIGHED] > 0.0, one[_SIGNALS], math.nan)
             self._take(one[0], one[_SETTINGS], signals)
-        self.layers += 1
 
     @property
     def sigma(self) -> np.ndarray:
@@ -321,7 +327,7 @@ class RockFilter:
     def save(self) -> dict[str, Any]:
         """State as plain values."""
         arrays = {name: getattr(self, name).ravel().tolist() for name in _ARRAYS}
-        return {**arrays, "since": self.since, "layers": self.layers}
+        return {**arrays, "since": self.since, "deep": self.deep, "layers": self.layers}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to a state."""
@@ -329,6 +335,7 @@ class RockFilter:
             setattr(self, name, np.array(saved[name], float).reshape(shape))
         self.cells = self.cells.astype(int)
         self.since, self.layers = int(saved["since"]), int(saved["layers"])
+        self.deep = float(saved["deep"])
 
 
 _ARRAYS = {

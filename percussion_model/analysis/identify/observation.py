@@ -36,17 +36,21 @@ EDGE = 1.1
 SLOPE = 0.01  # steps of slopes, by the same
 
 
+# Terms of pressure and feed by which surfaces over ratio and stiffness go into one another.
+BETWEEN = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2]])
+
+
 @dataclass(frozen=True)
 class Table:
-    """Polynomials of the logarithms of a blow's numbers.
+    """Logarithms of a blow's numbers: polynomials, or surfaces of splines at a few settings.
 
     Attributes
     ----------
     middle, half : ndarray, shape (4,)
         Of the logarithms of pressure [Pa], feed [N], unloading ratio and stiffness [N/m] in it.
-    powers : ndarray of int, shape (terms, 4)
-        Of the scaled logarithms in each term.
-    terms : ndarray, shape (5, terms)
+    powers : ndarray of int, shape (terms, 4) or (terms, 2)
+        Of the scaled logarithms in each term; of the last two where there are surfaces.
+    terms : ndarray, shape (5, terms) or (settings * 5, terms)
         Coefficients of ln W, ln f, ln A, ln F and ln r F_0.
     errors : ndarray, shape (3,)
         Of the logarithms of rate, frequency and torque, by points left out of the fit.
@@ -54,12 +58,12 @@ class Table:
         Of the hole [m^2]; mean radius of the buttons [m].
     buttons, exponent : float
         Of the bit; of the loading.
-    stretch : ndarray, shape (4,)
-        By which the scaled logarithms are multiplied for distances: where blows meet the waves of
-        earlier ones, they change fast along one of them.
-    nodes : ndarray, shape (n, 4)
-        Points of splines that are added, stretched; none for polynomials alone.
-    weights : ndarray, shape (5, n)
+    stretch : ndarray, shape (2,)
+        By which the scaled logarithms of ratio and stiffness are multiplied for distances: where
+        blows meet the waves of earlier ones, they change fast along one of them.
+    nodes : ndarray, shape (n, 2)
+        Points of the splines, stretched; none for polynomials alone.
+    weights : ndarray, shape (settings * 5, n)
         Of thin-plate splines about them.
     """
 
@@ -72,8 +76,8 @@ class Table:
     radius: float
     buttons: float
     exponent: float
-    stretch: np.ndarray = field(default_factory=lambda: np.ones(4))
-    nodes: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    stretch: np.ndarray = field(default_factory=lambda: np.ones(2))
+    nodes: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
     weights: np.ndarray = field(default_factory=lambda: np.empty((5, 0)))
 
     def contains(self, settings: np.ndarray) -> np.ndarray:
@@ -94,10 +98,13 @@ class Table:
         ndarray, shape (5, n)
         """
         inside = np.clip((points - self.middle) / self.half, -EDGE, EDGE)
-        found = self.terms @ basis(inside, self.powers).T
-        if len(self.nodes):
-            found += self.weights @ splines(inside * self.stretch, self.nodes).T
-        return found
+        if not len(self.nodes):
+            return np.asarray(self.terms @ basis(inside, self.powers).T)
+        rock = inside[:, 2:]
+        surfaces = basis(rock, self.powers) @ self.terms.T
+        surfaces += splines(rock * self.stretch, self.nodes) @ self.weights.T
+        surfaces = surfaces.reshape(len(points), len(BETWEEN), -1)
+        return np.einsum("ns,nsr->rn", shares(inside[:, :2]), surfaces)
 
     def predict(self, unknowns: np.ndarray, settings: np.ndarray) -> np.ndarray:
         """Logarithms of what a rig measures.
@@ -144,6 +151,15 @@ class Table:
         climbing = fresh * np.maximum(work - force * gained, 0.0) * blows / speed
         torque = climbing + rubbing * np.exp(friction)
         return np.stack([np.log(gained * blows), rows[..., BLOWS], np.log(torque)], axis=-1)
+
+
+# Settings of the surfaces, scaled.
+AT = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [0.0, 0.0], [0.0, 1.0]])
+
+
+def shares(x: np.ndarray) -> np.ndarray:
+    """Share of each surface at scaled settings, shape (n, settings)."""
+    return np.asarray(np.linalg.solve(basis(AT, BETWEEN).T, basis(x, BETWEEN).T).T)
 
 
 def splines(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:

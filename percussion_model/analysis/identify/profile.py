@@ -46,8 +46,8 @@ SURE = 1.96
 DETERMINED = 0.5
 # Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
 LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
-# Points and degree of a table; blows of a drill string take fifty times as long.
-MANY, FEW = 500, 80
+# Rocks of a table; blows of a drill string take fifty times as long.
+MANY, FEW = 300, 25
 # Rock from place to place, by the logarithm of its rate: by samples of a block, of which there have
 # to be so many pairs at like settings; what is assumed without, at least, and at most.
 BLOCK, FEWEST_STEPS, VARIES, LEAST_VARIES, MOST_VARIES = 20, 8, 0.01, 0.003, 0.1
@@ -205,8 +205,7 @@ def identify(
     samples.notes += [said] * bool(said)
     samples.notes += _odd_rate(samples, table, prior)
     noise = noise_of(samples, table, prior)
-    found = RockFilter(table, prior.mean, prior.spread, noise)
-    return _along(samples, found, prior, noise, scene, tell)
+    return _along(samples, table, prior, noise, scene, tell)
 
 
 def _odd_rate(samples: Samples, table: Table, prior: Prior) -> list[str]:
@@ -308,12 +307,13 @@ def _scatter(steps: np.ndarray) -> float:
 
 def _along(
     samples: Samples,
-    found: RockFilter,
+    table: Table,
     prior: Prior,
     noise: Noise,
     scene: Scene,
     tell: Callable[[str, float | None], None],
 ) -> Profile:
+    found = RockFilter(table, prior.mean, prior.spread, noise)
     count = len(samples.depth)
     mean, spread = np.empty((count, len(UNKNOWNS))), np.empty((count, len(UNKNOWNS)))
     layers: list[float] = []
@@ -321,7 +321,7 @@ def _along(
     for k in range(count):
         ago = found.sample(float(deeper[k]), samples.settings[k], samples.signals[k])
         if ago:
-            layers.append(float(samples.depth[k - ago + 1]))
+            layers[found.layers - 1 :] = [float(samples.depth[k - ago + 1])] * bool(found.layers)
             # found by samples that had been taken for the layer above
             mean[k - ago + 1 : k], spread[k - ago + 1 : k] = found.x, found.sigma
         mean[k], spread[k] = found.x, found.sigma
