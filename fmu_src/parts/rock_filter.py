@@ -105,12 +105,8 @@ class RockFilter(Model):
             tried = from_numbers(self.parameters)
             tried.restore(saved["filter"])
             np.linalg.cholesky(tried.ps), np.linalg.cholesky(tried.p0)
-            if (
-                not len(tried.x0[tried.cells])
-                == len(tried.xs)
-                == len(tried.weights)
-                == len(tried.ps)
-            ):
+            rows = (tried.x0[tried.cells], tried.xs, tried.weights, tried.ps)
+            if len(set(map(len, rows))) > 1:
                 raise ValueError
         except (ValueError, IndexError, np.linalg.LinAlgError):
             return "a filter whose numbers do not belong together"
@@ -140,13 +136,8 @@ def _numbers() -> Entries:
     for name, noise in zip(SIGNALS, (0.05, 0.005, 0.1), strict=True):
         found[f"error.{name}"] = ("1", 0.0, 10.0, 0.03, f"error of the table in ln {name}")
         found[f"noise.{name}"] = ("1", 1e-6, 10.0, noise, f"noise of a sample in ln {name}")
-    found["noise.varies"] = (
-        "1",
-        0.0,
-        10.0,
-        0.01,
-        "rock from place to place in a layer, in ln rate",
-    )
+    varies = "rock from place to place in a layer, in ln rate"
+    found["noise.varies"] = ("1", 0.0, 10.0, 0.01, varies)
     for name in UNKNOWNS:
         found[f"prior.{name}"] = ("1", *_LOG, 0.0, f"ln {name} before the first sample, SI")
         found[f"spread.{name}"] = ("1", 1e-6, 100.0, 0.5, f"its standard deviation, of {name}")

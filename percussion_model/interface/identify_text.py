@@ -62,7 +62,14 @@ def unknown_rows(found: Profile) -> list[tuple[str, ...]]:
 def count_rows(found: Profile) -> list[tuple[str, ...]]:
     """Rows of the log by the rule that left them out."""
     rows = [(rule, f"{count}") for rule, count in found.samples.dropped.items()]
-    return [*rows, ("used", f"{len(found.depth)}"), ("in the log", f"{found.samples.total}")]
+    return [("in the log", f"{found.samples.total}"), ("used", f"{len(found.depth)}"), *rows]
+
+
+def rows_said(found: Profile) -> str:
+    """Say how many rows of the log are used, and which are not."""
+    left_out = "; ".join(f"{count} {rule}" for rule, count in found.samples.dropped.items())
+    used = f"{len(found.depth)} of {found.samples.total} rows are used"
+    return f"{used}. Left out: {left_out or 'none'}."
 
 
 def notes(found: Profile) -> list[str]:
@@ -143,7 +150,7 @@ def part_text(found: Profile, drill: Drill) -> str:
 
 
 def write_pages(
-    found: Profile, folder: Path, name: str, hammer: str, every: float, changes: Sequence[Change]
+    found: Profile, folder: Path, name: str, tool: str, every: float, changes: Sequence[Change]
 ) -> list[Path]:
     """Write table, figure and report into a folder, all or none."""
     from matplotlib import rc_context
@@ -159,7 +166,7 @@ def write_pages(
             ("behind the last sample", "value", "95 %", ""),
             unknown_rows(found),
         ),
-        ("Rows", ("rule", "rows"), count_rows(found)),
+        ("Rows", ("", "rows"), count_rows(found)),
     ]
     if changes:
         heads = ("half of the next metre", "energy / efficiency", "shows too")
@@ -170,7 +177,7 @@ def write_pages(
             figure = draw_profile(found, f"Rock of {name}")
             picture = style.save_png(figure, draft / "rock.png", 110)
         page = filled(
-            "identify.html.j2", name=name, hammer=hammer, depth=float(found.depth[-1]),
+            "identify.html.j2", name=name, tool=tool, depth=float(found.depth[-1]),
             picture=b64encode(picture.read_bytes()).decode(), tables=tables, notes=notes(found),
         )  # fmt: skip
         (draft / "report.html").write_text(page, encoding="utf-8")

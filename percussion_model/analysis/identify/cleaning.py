@@ -152,12 +152,12 @@ def clean(log: Log, own: dict[str, float], collaring: float = COLLARING) -> Samp
     rules = (
         ("repeated", new),
         ("without depth or setting", there),
-        ("depth leaps away and comes back", ~leaps),
-        ("bit back: rod changes, retraction", ~back),
-        ("percussion or feed off", ~off),
-        ("no advance", ~off_rows),
-        ("collaring", depth >= np.nanmin(depth, initial=np.inf) + collaring),
-        ("run-in behind a stop", ~_behind_stops(depth, deepest, time, back | off | off_rows)),
+        ("whose depth leaps away and comes back", ~leaps),
+        ("bit back for a rod or in retraction", ~back),
+        ("with percussion or feed off", ~off),
+        ("without advance", ~off_rows),
+        ("at the collar", depth >= np.nanmin(depth, initial=np.inf) + collaring),
+        ("behind a stop", ~_behind_stops(depth, deepest, time, back | off | off_rows)),
         ("without a rate", np.isfinite(signals[:, RATE])),
     )
     alive = np.ones(total, bool)

@@ -48,7 +48,7 @@ MOST_GROUPS = 8
 FORGOTTEN = 8.0
 # Errors of a sample that count; beyond, a sample weighs less, as an outlier. One at the edge of a
 # group may belong to its neighbour, and be off by so many.
-HUBER, EDGE = 2.5, 1.5
+HUBER, EDGE = 2.5, 1.0
 # By how many of the first a sample counts for a change of layer: two outliers in four make none.
 HELD = 1.6
 # Samples whose mean is held against what is known, and how many standard deviations make a layer:
@@ -307,7 +307,7 @@ class RockFilter:
         """Go back by some samples, forget what a new layer may change, and take them again."""
         again, before = self.memory[-ago:], self.memory[:-ago]
         x, p, slow = self.mean.copy(), np.diag(self.spread**2), np.ix_(SLOW, SLOW)
-        if self.deep - again[:, 0].sum() < THIN:
+        if self.layers and self.deep - again[:, 0].sum() < THIN:
             x[SLOW], p[slow] = self.x0[0, SLOW], self.p0[slow]
         else:
             self.groups = _added(self.before, before)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -43,18 +43,17 @@ from percussion_model.scene.scene import Scene
 # Standard deviations of an interval of 95 %.
 SURE = 1.96
 # The data determine what they narrow to less than this share of its prior.
-DETERMINED = 0.5
+DETERMINED = 0.4
 # Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
 LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
 # Rocks of a table; blows of a drill string take fifty times as long.
 MANY, FEW = 300, 25
+SAMPLES = 100  # that are filtered in the time of a rock
 # Rock from place to place, by the logarithm of its rate: by samples of a block, of which there have
 # to be so many pairs at like settings; what is assumed without, at least, and at most.
 BLOCK, FEWEST_STEPS, VARIES, LEAST_VARIES, MOST_VARIES = 20, 8, 0.01, 0.003, 0.1
 # A rate so many times what is usual, or less by that, is likely in another unit than is said.
 ODD = 10.0
-# A table reaches as far as the settings of the log.
-NO_ROOM: Mapping[str, tuple[float, float]] = {}
 # Mean absolute deviation of a normal variable, by its standard deviation.
 MAD = 0.6745
 
@@ -91,7 +90,6 @@ class Profile:
     noise: Noise
     worn: np.ndarray
     covariance: np.ndarray
-    notes: list[str] = field(default_factory=list)
 
     def __repr__(self) -> str:
         ends = f"{self.depth[0]:.4g} to {self.depth[-1]:.4g} m"
@@ -145,7 +143,7 @@ class Profile:
             "samples": len(self.depth), "dropped": self.samples.dropped,
             "noise": dict(zip(SIGNALS, self.noise.values().tolist(), strict=True)),
             "table_errors": dict(zip(SIGNALS, self.table.errors.tolist(), strict=True)),
-            "notes": [*self.samples.notes, *self.notes],
+            "notes": self.samples.notes,
         }  # fmt: skip
 
 
@@ -191,10 +189,14 @@ def identify(
            "speed": scene["rotation.speed"]}  # fmt: skip
     samples = clean(log, own, collaring)
     prior = prior_of(scene, rock)
+    ends = 0.0
     if table is None:
         wanted = _ranges(samples, prior)
         size = FEW if scene["effects.string"] else MANY
-        table = tabulate(scene, drill.changes, wanted, lambda s: tell("runs a table", s), size)
+        ends = size / (size + len(samples.depth) / SAMPLES)
+        table = tabulate(
+            scene, drill.changes, wanted, lambda s: tell("runs a table", ends * s), size
+        )
     samples = clean(without_lags(log, samples, table, prior.mean), own, collaring)
     samples = samples.kept(table.contains(samples.settings), "pressure or feed out of the usual")
     if len(samples.depth) < FEWEST:
@@ -205,7 +207,10 @@ def identify(
     samples.notes += [said] * bool(said)
     samples.notes += _odd_rate(samples, table, prior)
     noise = noise_of(samples, table, prior)
-    return _along(samples, table, prior, noise, scene, tell)
+    return _along(
+        samples, table, prior, noise, scene,
+        lambda share: tell("filters the log", ends + (1.0 - ends) * share),
+    )  # fmt: skip
 
 
 def _odd_rate(samples: Samples, table: Table, prior: Prior) -> list[str]:
@@ -234,7 +239,8 @@ def table_with_room(
         Shares of the least and the greatest pressure and feed.
     """
     ranges = _ranges(profile.samples, profile.prior, room)
-    return tabulate(drill.scene, drill.changes, ranges, progress, FEW)
+    size = FEW if drill.scene["effects.string"] else MANY // 4
+    return tabulate(drill.scene, drill.changes, ranges, progress, size)
 
 
 def part_filter(profile: Profile, drill: Drill) -> RockFilter:
@@ -247,11 +253,11 @@ def part_filter(profile: Profile, drill: Drill) -> RockFilter:
 
 
 def _ranges(
-    samples: Samples, prior: Prior, room: Mapping[str, tuple[float, float]] = NO_ROOM
+    samples: Samples, prior: Prior, room: Mapping[str, tuple[float, float]] | None = None
 ) -> dict[str, tuple[float, float]]:
     found = {}
     for name, (low, high) in zip(("pressure", "feed"), ranges_of(samples), strict=True):
-        less, more = room.get(name, (1.0, 1.0))
+        less, more = (room or {}).get(name, (1.0, 1.0))
         found[name] = less * low, more * high
     for name, k in (("unloading_ratio", GAMMA), ("loading_stiffness", STIFFNESS)):
         off = REACH * prior.spread[k]
@@ -311,7 +317,7 @@ def _along(
     prior: Prior,
     noise: Noise,
     scene: Scene,
-    tell: Callable[[str, float | None], None],
+    tell: Callable[[float], None],
 ) -> Profile:
     found = RockFilter(table, prior.mean, prior.spread, noise)
     count = len(samples.depth)
@@ -321,12 +327,12 @@ def _along(
     for k in range(count):
         ago = found.sample(float(deeper[k]), samples.settings[k], samples.signals[k])
         if ago:
-            layers[found.layers - 1 :] = [float(samples.depth[k - ago + 1])] * bool(found.layers)
+            layers[found.layers - 1 :] = [float(samples.depth[k - ago + 1])]
             # found by samples that had been taken for the layer above
             mean[k - ago + 1 : k], spread[k - ago + 1 : k] = found.x, found.sigma
         mean[k], spread[k] = found.x, found.sigma
         if k % 500 == 0:
-            tell("filters the log", k / count)
+            tell(k / count)
     length, worn = scene["breaking.wear_length"], np.ones(count)
     if length:
         fresh = np.exp(-(scene["breaking.drilled"] + samples.depth - samples.depth[0]) / length)

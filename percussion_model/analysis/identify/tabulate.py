@@ -116,10 +116,9 @@ def tabulate(
             f"range of pressure and feed, or correct its units; the last error: {why}"
         )
     x, y = places.reshape(points, -1, 4)[kept, 0], y[kept]
-    rest = (
-        hole_area(scene), scene["rotation.mean_radius"], float(scene["breaking.buttons"]),
-        _exponent(scene),
-    )  # fmt: skip
+    exponent = scene["rock.loading_exponent"] if scene["effects.rock"] == "power" else 1.0
+    area, radius = hole_area(scene), scene["rotation.mean_radius"]
+    rest = area, radius, float(scene["breaking.buttons"]), float(exponent)
     if not with_splines:
         terms, _, off = _fit(x, y, POWERS)
         errors = DOUBT * _errors(scene, y, off, np.ones(len(x)))
@@ -175,10 +174,6 @@ def spread_points(count: int, dimensions: int) -> np.ndarray:
 def hole_area(scene: Scene) -> float:
     """Area of the hole [m^2]."""
     return 0.25 * math.pi * float(scene.hole_diameter or 0.0) ** 2
-
-
-def _exponent(scene: Scene) -> float:
-    return float(scene["rock.loading_exponent"]) if scene["effects.rock"] == "power" else 1.0
 
 
 def _fresh(scene: Scene, drive: Drive, values: np.ndarray) -> Scene:

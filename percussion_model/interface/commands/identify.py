@@ -113,12 +113,12 @@ def identify(
         _show(found)
         if changes:
             print(identify_text.plan_words(changes))
+    hole = f"hole of {1e3 * (drill.scene.hole_diameter or 0.0):.0f} mm"
+    tool = f"Hammer {hammer}, bit {bit or 'of the scene'}, {hole}"
     with common.if_drawable():
         files = common.write_folder(
             claimed,
-            lambda folder: identify_text.write_pages(
-                found, folder, log.name, hammer, every, changes
-            ),
+            lambda folder: identify_text.write_pages(found, folder, log.name, tool, every, changes),
         )
         common.list_files([*files, *common.sign(claimed)])
 
@@ -176,5 +176,4 @@ def _show(found: Profile) -> None:
     for row in identify_text.unknown_rows(found):
         rest.add_row(*row)
     print_table(rest)
-    counts = ", ".join(f"{rule} {count}" for rule, count in identify_text.count_rows(found))
-    print_notes([f"Rows: {counts}.", *identify_text.notes(found)])
+    print_notes([identify_text.rows_said(found), *identify_text.notes(found)])
