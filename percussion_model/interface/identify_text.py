@@ -67,9 +67,9 @@ def count_rows(found: Profile) -> list[tuple[str, ...]]:
 
 def rows_said(found: Profile) -> str:
     """Say how many rows of the log are used, and which are not."""
-    left_out = "; ".join(f"{count} {rule}" for rule, count in found.samples.dropped.items())
+    dropped = "; ".join(f"{count} {rule}" for rule, count in found.samples.dropped.items())
     used = f"{len(found.depth)} of {found.samples.total} rows are used"
-    return f"{used}. Left out: {left_out or 'none'}."
+    return f"{used}. Dropped: {dropped or 'none'}."
 
 
 def notes(found: Profile) -> list[str]:
