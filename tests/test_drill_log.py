@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from percussion_model.analysis.fitting import FitError
-from percussion_model.analysis.identify.cleaning import clean
+from percussion_model.analysis.identify.cleaning import OVER, clean
 from percussion_model.analysis.identify.tabulate import IdentifyError
 from percussion_model.interface.drill_log import read_log
 from percussion_model.scene.rows import SceneError
@@ -44,9 +44,9 @@ def with_row(at, line):
     return "\n".join(lines) + "\n"
 
 
-def without(*columns):
+def without(*columns, count=120):
     kept = [k for k in range(len(HEAD)) if k not in columns]
-    return text_of([[row[k] for k in kept] for row in rows()], [HEAD[k] for k in kept])
+    return text_of([[row[k] for k in kept] for row in rows(count)], [HEAD[k] for k in kept])
 
 
 def headed(column, title):
@@ -122,7 +122,7 @@ CLEANED = {
         "depth leaps away and comes back: 5",
     ),
     "depth negative downwards": (stepped(0, [f"-{row[1]}" for row in rows()], 1), "downwards"),
-    "no rate": (without(2), "rate: none in the log; depth over time"),
+    "no rate": (without(2, count=400), "rate: none in the log; depth over time"),
     "no depth": (without(1), "depth: none in the log"),
     "no rotation": (without(5), "speed: none in the log; the hammer's, 5.7 rad/s"),
 }
@@ -149,6 +149,15 @@ def test_what_is_cleaned_is_counted(name, tmp_path):
     assert any(said in one for one in told), told
     assert len(found.depth) + sum(found.dropped.values()) == found.total
     assert np.all(np.isfinite(found.signals[:, 0]))
+
+
+def test_rates_by_the_depth_share_no_rows(tmp_path):
+    """A mean over rows that overlap would tell less than so many samples do."""
+    path = tmp_path / "log.csv"
+    path.write_text(without(2, count=400), encoding="utf-8")
+    found = clean(read_log(path), OWN)
+    assert np.diff(found.rows).min() == OVER
+    assert found.signals[:, 0] == pytest.approx(0.01, rel=1e-2)  # m/s
 
 
 def test_columns_units_and_marks_do_not_matter(tmp_path):

@@ -34,7 +34,9 @@ SCENE = Scene(title="rigid bodies").computed_by("rigid")
 AXES = {"feed.force": [1500.0, 2500.0, 4000.0], "rock.loading_stiffness": [3e8, 7.5e8]}
 
 
-@pytest.mark.parametrize("key", ["feed.strength", "solver.name", "piston.sections"])
+@pytest.mark.parametrize(
+    "key", ["feed.strength", "solver.name", "piston.sections", "pneumatic.supply_pressure"]
+)
 def test_keys_that_no_study_can_vary_are_refused_at_once(key, tmp_path):
     with pytest.raises(SceneError, match=key):
         study(SCENE, grid({key: [1.0]}), tmp_path / "out")

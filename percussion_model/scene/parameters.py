@@ -584,7 +584,7 @@ def unknown_key(key: str) -> str:
     underlined = {one.replace(".", "_"): one for one in keys}
     if key in underlined:  # as keyword arguments of Python are written
         return f"unknown key {key}: did you mean {underlined[key]}?"
-    known = list(keys) if parent else ["title", HOLE_DIAMETER.key, *GROUPS]
+    known = [] if key in GROUPS else keys if parent else ["title", HOLE_DIAMETER.key, *GROUPS]
     if near := difflib.get_close_matches(generic_key(key), known, 1, SIMILAR_ENOUGH):
         return f"unknown key {key}: did you mean {near[0].replace('.*', '.0')}?"
     if siblings and parent:

@@ -205,7 +205,8 @@ def _rate(log: Log, notes: list[str]) -> np.ndarray:
     way = columns["depth"][OVER:] - columns["depth"][:-OVER]
     shift = OVER // 2
     rate[shift : shift + len(span)] = np.where(span > 0.0, way / np.maximum(span, 1e-12), np.nan)
-    notes.append(f"rate: none in the log; depth over time, of {OVER} rows")
+    rate[np.arange(len(rate)) % OVER != shift] = np.nan  # those between share what they tell
+    notes.append(f"rate: none in the log; depth over time, one of {OVER} rows each")
     return rate
 
 

@@ -239,6 +239,8 @@ def refuse_unknown(scene: Scene, points: Points) -> None:
     for key, column in zip(points.keys, points.values.T, strict=True):
         row = scene.row_of(key)
         _refuse_no_number(row, key)
+        if not scene.matters(key):
+            raise SceneError(f"{key} has no effect in this scene: it needs {row.effect}")
         broken = column[column != np.floor(column)]
         if row.kind == "whole number" and len(broken):
             raise SceneError(
