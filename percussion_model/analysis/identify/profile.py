@@ -46,8 +46,9 @@ SURE = 1.96
 DETERMINED = 0.4
 # Noise that is assumed at least, and at most, by the logarithm, in the order of `SIGNALS`.
 LEAST_NOISE, MOST_NOISE = (0.02, 0.003, 0.04), (0.4, 0.1, 0.6)
-# Rocks of a table; blows of a drill string take fifty times as long.
-MANY, FEW = 300, 25
+# Rocks of a table; fewer where no rock is named, whose motions often do not settle; blows of a
+# drill string take fifty times as long.
+MANY, WIDE, FEW = 300, 180, 25
 SAMPLES = 100  # that are filtered in the time of a rock
 # Rock from place to place, by the logarithm of its rate: by samples of a block, of which there have
 # to be so many pairs at like settings; what is assumed without, at least, and at most.
@@ -192,7 +193,7 @@ def identify(
     ends = 0.0
     if table is None:
         wanted = _ranges(samples, prior)
-        size = FEW if scene["effects.string"] else MANY
+        size = FEW if scene["effects.string"] else MANY if rock else WIDE
         ends = size / (size + len(samples.depth) / SAMPLES)
         table = tabulate(
             scene, drill.changes, wanted, lambda s: tell("runs a table", ends * s), size
