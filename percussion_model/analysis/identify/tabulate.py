@@ -1,6 +1,7 @@
 """The table of settled responses that a filter asks, of a hammer, its bit and a range of settings.
 
-A settled run a point, of fresh rock, so that a blow breaks what it crushes beyond the threshold.
+Two settled runs a point, without friction and with it, of fresh rock, so that a blow breaks what it
+crushes beyond the threshold.
 """
 
 from __future__ import annotations
